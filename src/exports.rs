@@ -9,6 +9,7 @@ use abbe_apply::export::kinematics::{ENTRIES, EntryChoice, KinematicTable};
 use abbe_apply::export::neutral::{self, AxisPlace};
 use abbe_apply::export::travel::Travel;
 use abbe_apply::export::{left_out, urdf, urdf_patch};
+use abbe_identify::IdentifyError;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::parameters::Role;
 use abbe_model::component::{ErrorKind, ErrorName};
@@ -159,10 +160,12 @@ pub struct ExportResult {
 /// # Errors
 /// If there is none.
 pub fn entries(word: &str) -> Result<EntryChoice, ApplyError> {
-    ENTRIES.iter().find(|(_, own, _)| *own == word).map(|(choice, ..)| *choice).ok_or_else(|| {
-        let words = ENTRIES.map(|(_, word, _)| word).join(", ");
-        ApplyError::Request(format!("there are no entries `{word}`; the choices are {words}"))
-    })
+    let known = ENTRIES.map(|(_, word, _)| word);
+    ENTRIES
+        .iter()
+        .find(|(_, own, _)| *own == word)
+        .map(|(choice, ..)| *choice)
+        .ok_or_else(|| IdentifyError::unknown("the export", "choice of entries", word, "the choices are", known).into())
 }
 
 /// The format of this word.
@@ -171,8 +174,8 @@ pub fn entries(word: &str) -> Result<EntryChoice, ApplyError> {
 /// If there is none.
 pub fn format(word: &str) -> Result<ExportFormat, ApplyError> {
     formats().into_iter().find(|format| format.word == word).ok_or_else(|| {
-        let words = formats().into_iter().map(|format| format.word).collect::<Vec<_>>().join(", ");
-        ApplyError::Request(format!("there is no format `{word}`; the formats are {words}"))
+        let known = formats().into_iter().map(|format| format.word);
+        IdentifyError::unknown("the export", "format", word, "the formats are", known).into()
     })
 }
 
@@ -219,10 +222,17 @@ impl ExportFormat {
     }
 }
 
+fn written(table: &Table) -> Result<Vec<u8>, IdentifyError> {
+    csv::text(table).map_err(|why| IdentifyError::Write { what: "the table", cause: std::io::Error::other(why) })
+}
+
 /// A table under its header.
 fn tabled(header: String, table: Table, result: ExportResult) -> Result<Exported, ApplyError> {
-    let rows = csv::text(&table).map_err(ApplyError::Request)?;
-    Ok(Exported { contents: Contents::File([header.into_bytes(), rows].concat()), table: Some(table), result })
+    Ok(Exported {
+        contents: Contents::File([header.into_bytes(), written(&table)?].concat()),
+        table: Some(table),
+        result,
+    })
 }
 
 fn of_urdf(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, ApplyError> {
@@ -274,8 +284,8 @@ fn of_locations(model: &IdentifiedModel, format: &TableFormat) -> Result<Exporte
     let compensation = Compensation { locations, left_out: left_out(model), ..Compensation::default() };
     let tables = compensation::tables(&model.machine, &compensation, format, MAX_POINTS);
     let file = tables.files.into_iter().next();
-    let missing = || ApplyError::Request("the model has no location error that the format holds".to_string());
-    let (_, text) = file.ok_or_else(missing)?;
+    let holds = "it holds location errors, and the model has none of these";
+    let (_, text) = file.ok_or_else(|| ApplyError::unrepresentable("the format", "the model", holds))?;
     let result = ExportResult { left_out: tables.left_out, ..ExportResult::default() };
     Ok(Exported { contents: Contents::File(text.into_bytes()), table: None, result })
 }
@@ -283,22 +293,21 @@ fn of_locations(model: &IdentifiedModel, format: &TableFormat) -> Result<Exporte
 /// The error motions as compensation tables with a number of places along each axis, and their standard uncertainty.
 fn of_tables(model: &IdentifiedModel, format: &TableFormat, places: usize) -> Result<Exported, ApplyError> {
     if !(2..=MAX_POINTS).contains(&places) {
-        return Err(ApplyError::Request(format!(
-            "a table of {places} places: a number from 2 to {MAX_POINTS} is expected, the maximum of LinuxCNC and Heidenhain"
-        )));
+        let found = format!("a number from 2 to {MAX_POINTS} is expected");
+        let expected = "the maximum is that of LinuxCNC and Heidenhain";
+        return Err(IdentifyError::not_applicable(format!("a table of {places} places"), found, expected).into());
     }
     let found = compensation::tables(&model.machine, &of_model(model), format, places);
     if found.files.is_empty() {
         let all = found.left_out.iter().map(|line| format!("\n  {line}")).collect::<String>();
-        return Err(ApplyError::Request(format!(
-            "no error can be compensated in this format: declare error motions as [[effect]], as `abbe trace --write` \
-             does, and fit again{all}"
-        )));
+        let holds = "declare error motions as [[effect]], as `abbe trace --write` does, and fit again";
+        let found = "no error can be compensated in this format";
+        return Err(IdentifyError::not_applicable("the model", found, format!("{holds}{all}")).into());
     }
     let mut files: Vec<(String, Vec<u8>)> =
         found.files.into_iter().map(|(name, text)| (name, text.into_bytes())).collect();
     let table = uncertainties(&found.uncertainties);
-    files.push((UNCERTAINTIES.to_string(), csv::text(&table).map_err(ApplyError::Request)?));
+    files.push((UNCERTAINTIES.to_string(), written(&table)?));
     let import = format.import.iter().map(ToString::to_string).collect();
     let result = ExportResult { left_out: found.left_out, import, ..ExportResult::default() };
     Ok(Exported { contents: Contents::Folder(files), table: None, result })

@@ -145,7 +145,8 @@ pub fn import(files: &[Foreign], target: Target<'_>, options: &ImportOptions) ->
     let names: Vec<String> = files.iter().map(Foreign::stem).collect();
     for (place, name) in names.iter().enumerate() {
         if names[..place].iter().any(|other| other.to_lowercase() == name.to_lowercase()) {
-            return Err(IdentifyError::Request(format!("two files are named {name}: each is the test of its name")));
+            let found = format!("two files are named {name}");
+            return Err(IdentifyError::not_applicable("import", found, "each is the test of its name"));
         }
     }
     let read_options =
@@ -154,7 +155,7 @@ pub fn import(files: &[Foreign], target: Target<'_>, options: &ImportOptions) ->
         Target::Session(file) => Draft::of_session(file, &read_options, &names, options.like.as_deref(), &options.set)?,
         Target::Machine(file) => {
             let Some(first) = files.first() else {
-                return Err(IdentifyError::Request("no file is named".into()));
+                return Err(IdentifyError::TooFew { purpose: "an import", what: "file", least: 1, found: 0 });
             };
             let kind = match options.kind {
                 Some(kind) => kind,

@@ -10,9 +10,27 @@ pub enum ApplyError {
     /// The model or its session cannot be evaluated.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
-    /// The request is invalid.
-    #[error("{0}")]
-    Request(String),
+    /// A format, or the compensation, cannot represent something.
+    #[error("{format} cannot represent {found}: {holds}")]
+    Unrepresentable {
+        /// The format.
+        format: String,
+        /// What it cannot represent.
+        found: String,
+        /// What it represents, or what to do.
+        holds: String,
+    },
+}
+
+impl ApplyError {
+    /// [`ApplyError::Unrepresentable`] of its three parts.
+    pub fn unrepresentable(
+        format: impl Into<String>,
+        found: impl Into<String>,
+        holds: impl Into<String>,
+    ) -> ApplyError {
+        ApplyError::Unrepresentable { format: format.into(), found: found.into(), holds: holds.into() }
+    }
 }
 
 impl From<ModelError> for ApplyError {

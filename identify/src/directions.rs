@@ -13,6 +13,7 @@
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::frames::{Point, cross};
+use abbe_model::instrument::InstrumentKind;
 use abbe_model::instrument::rtest::{Orientation, RTest, SENSOR, Setting};
 use abbe_model::session::{placing, readings::Readings};
 use nalgebra::{Matrix3, Vector3};
@@ -54,10 +55,8 @@ pub fn views(problem: &Problem, fit: &Fit) -> Result<Vec<Vec<DirectionComponents
     let mut all = Vec::with_capacity(problem.tests.len());
     for (number, test) in problem.tests.iter().enumerate() {
         let (Some(rtest), Some(readings)) = (test.station.rtest(), &test.readings) else {
-            return Err(IdentifyError::Request(format!(
-                "directional components need an r-test; this session's instrument is a {}",
-                problem.session.instrument.word()
-            )));
+            let (found, expected) = (test.station.kind(), InstrumentKind::RTest);
+            return Err(IdentifyError::OtherInstrument { method: "directional components", found, expected });
         };
         let angles = std::array::from_fn(|i| values[number].constant[machine.error_slots() + SENSOR + i]);
         let orientation = Orientation::new(angles, machine.rotation);

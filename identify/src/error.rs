@@ -1,5 +1,12 @@
 //! The error type of this crate.
 
+use std::io;
+
+use abbe_model::chain::Machine;
+use abbe_model::files::spelling::suggestion;
+use abbe_model::instrument::InstrumentKind;
+use abbe_model::words::{cut, number};
+
 /// Errors of an identification.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -53,7 +60,7 @@ pub enum IdentifyError {
         instrument: &'static str,
     },
     /// Two parameters have the same identifier.
-    #[error("`{id}` is declared twice; remove one of the two declarations")]
+    #[error("`{id}` is given twice; remove one of the two")]
     RepeatedUnknown {
         /// The identifier.
         id: String,
@@ -92,7 +99,181 @@ pub enum IdentifyError {
     /// A matrix decomposition failed.
     #[error("a matrix of the least-squares problem has entries that are not finite")]
     Decomposition,
-    /// The request is invalid.
-    #[error("{0}")]
-    Request(String),
+    /// A value is not written as name, number and unit.
+    #[error("`{text}` {fault}; write name, number and unit as in `EY0A=35.3um`")]
+    NotAQuantity {
+        /// The value as given.
+        text: String,
+        /// What is wrong with it.
+        fault: &'static str,
+    },
+    /// The unit of a value is that of another quantity.
+    #[error("`{name}` has the unit `{unit}`; a unit such as `{expected}` is expected")]
+    OtherUnit {
+        /// The name of the value.
+        name: String,
+        /// Its unit.
+        unit: String,
+        /// A unit that fits.
+        expected: String,
+    },
+    /// A value is beyond a limit.
+    #[error("`{name}`: {found} is too large; the limit is {limit}")]
+    TooLarge {
+        /// The name of the value.
+        name: String,
+        /// The value, with its unit.
+        found: String,
+        /// The largest value, with its unit.
+        limit: String,
+    },
+    /// A value is outside its range.
+    #[error("{name}: {} is not in the range from {} to {} {unit}", number(*found), number(range[0]), number(range[1]))]
+    OutOfRange {
+        /// The name of the value.
+        name: String,
+        /// The value.
+        found: f64,
+        /// The least and the largest value.
+        range: [f64; 2],
+        /// The unit of all three.
+        unit: &'static str,
+    },
+    /// Fewer inputs than a computation needs.
+    #[error("{purpose} needs at least {least} {what}; given: {found}")]
+    TooFew {
+        /// The computation.
+        purpose: &'static str,
+        /// The inputs.
+        what: &'static str,
+        /// Their least number.
+        least: usize,
+        /// Their number.
+        found: usize,
+    },
+    /// A name that does not exist.
+    #[error("{of} has no {what} `{}`; {these} {}", cut(name, 80), known_names(name, known))]
+    Unknown {
+        /// What holds such names.
+        of: String,
+        /// What has such a name.
+        what: &'static str,
+        /// The name as given.
+        name: String,
+        /// The begin of the list of names that exist: `its axes are`.
+        these: &'static str,
+        /// The names that exist.
+        known: Vec<String>,
+    },
+    /// Something necessary is missing.
+    #[error("{of} has no {what}; {remedy}")]
+    Missing {
+        /// What lacks it.
+        of: String,
+        /// What is missing.
+        what: String,
+        /// What to do.
+        remedy: String,
+    },
+    /// Two inputs exclude each other.
+    #[error("{one} and {other} contradict each other; {remedy}")]
+    Contradictory {
+        /// One input.
+        one: String,
+        /// The other.
+        other: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// A method does not apply to the instrument of a test.
+    #[error("{method}: a test has the instrument `{}`, not `{}`", found.word(), expected.word())]
+    OtherInstrument {
+        /// The method.
+        method: &'static str,
+        /// The instrument of the test.
+        found: InstrumentKind,
+        /// The instrument of the method.
+        expected: InstrumentKind,
+    },
+    /// A method does not apply to the input.
+    #[error("{method}: {found}; {expected}")]
+    NotApplicable {
+        /// The method or the input that it concerns.
+        method: String,
+        /// What was found.
+        found: String,
+        /// What the method needs, or what to do.
+        expected: String,
+    },
+    /// Two inputs do not belong together.
+    #[error("{one} is not {relation} {other}: {difference}")]
+    Unlike {
+        /// One input.
+        one: String,
+        /// What it should be of the other.
+        relation: &'static str,
+        /// The other.
+        other: String,
+        /// What differs.
+        difference: String,
+    },
+    /// The readings determine no parameter.
+    #[error("no parameter is identifiable from these readings, so there is {lacking}")]
+    NothingIdentifiable {
+        /// What does not exist therefore.
+        lacking: &'static str,
+    },
+    /// The result of a fit justifies no certificate.
+    #[error("there is no certificate: {why}")]
+    NoCertificate {
+        /// What forbids it.
+        why: &'static str,
+    },
+    /// An output cannot be written.
+    #[error("{what} cannot be written: {cause}")]
+    Write {
+        /// The output.
+        what: &'static str,
+        /// The cause.
+        cause: io::Error,
+    },
+    /// The compiled library of effects is damaged.
+    #[error("the library of effects cannot be read: {0}")]
+    Library(Box<toml::de::Error>),
+}
+
+impl IdentifyError {
+    /// [`IdentifyError::NotApplicable`] of its three parts.
+    pub fn not_applicable(
+        method: impl Into<String>,
+        found: impl Into<String>,
+        expected: impl Into<String>,
+    ) -> IdentifyError {
+        IdentifyError::NotApplicable { method: method.into(), found: found.into(), expected: expected.into() }
+    }
+
+    /// [`IdentifyError::Unknown`] of its parts.
+    pub fn unknown(
+        of: impl Into<String>,
+        what: &'static str,
+        name: impl Into<String>,
+        these: &'static str,
+        known: impl IntoIterator<Item: Into<String>>,
+    ) -> IdentifyError {
+        let known = known.into_iter().map(Into::into).collect();
+        IdentifyError::Unknown { of: of.into(), what, name: name.into(), these, known }
+    }
+
+    /// [`IdentifyError::Unknown`] for an axis, behind the name that contains it.
+    pub fn no_axis(machine: &Machine, behind: &str, axis: &str) -> IdentifyError {
+        let of = format!("{behind}the machine \"{}\"", machine.name);
+        IdentifyError::unknown(of, "axis", axis, "its axes are", machine.axes.iter().map(|axis| &axis.name))
+    }
+}
+
+/// The names that exist, and the one that may be meant. A single letter resembles every other.
+fn known_names(name: &str, known: &[String]) -> String {
+    let near = if name.len() > 1 { suggestion(name, known) } else { String::new() };
+    let list = if known.is_empty() { "none".to_string() } else { known.join(", ") };
+    if near.is_empty() { list } else { format!("{list}; {}", near.trim_end()) }
 }

@@ -151,10 +151,7 @@ impl Parameters {
         for name in &session.unknowns {
             let id = name.to_string();
             let Some(slot) = session.machine.error_slot(name) else {
-                return Err(IdentifyError::Request(format!(
-                    "`{id}` is to be identified, but the machine `{}` has no axis `{}`",
-                    session.machine.name, name.axis
-                )));
+                return Err(IdentifyError::no_axis(&session.machine, &format!("`{id}`: "), &name.axis));
             };
             let unit = if name.freedom.is_angle() { InternalUnit::Radian } else { InternalUnit::Millimetre };
             let index = parameters.push(Parameter {

@@ -68,15 +68,17 @@ pub fn usual_sizes(session: &Session) -> Vec<Given> {
 /// finite.
 pub fn patterns(session: &Session, errors: &[Given]) -> Result<Patterns, IdentifyError> {
     if errors.is_empty() {
-        return Err(IdentifyError::Request(
-            "no error to show: `[unknowns] errors` is empty; give at least one error with its size, as in EY0A=10um"
-                .into(),
+        return Err(IdentifyError::not_applicable(
+            "no error to show",
+            "`[unknowns] errors` is empty",
+            "give at least one error with its size, as in EY0A=10um",
         ));
     }
     if session.units().angles {
-        return Err(IdentifyError::Request(
-            "patterns show lengths, and a test of this session reads angles: `plan` and the sensitivities of a report show both"
-                .into(),
+        return Err(IdentifyError::not_applicable(
+            "patterns show lengths",
+            "a test of this session reads angles",
+            "`plan` and the sensitivities of a report show both",
         ));
     }
     let mut exact = session.clone();

@@ -37,9 +37,7 @@ pub fn add_monte_carlo(
     result: &mut FitResult,
 ) -> Result<(), IdentifyError> {
     if fit.rank.identifiable_basis.ncols() == 0 {
-        return Err(IdentifyError::Request(
-            "no parameter is identifiable from these readings, so there is nothing to propagate".into(),
-        ));
+        return Err(IdentifyError::NothingIdentifiable { lacking: "nothing to propagate" });
     }
     let refit = Refit::new(problem, fit)?;
     let mean = vec![0.0; refit.u.len()];
@@ -49,11 +47,12 @@ pub fn add_monte_carlo(
     );
     let unconverged = distributions.iter().map(|d| d.outside[2]).max().unwrap_or(0);
     if unconverged * 2 > draws.runs {
-        return Err(IdentifyError::Request(format!(
-            "{unconverged} of {} cannot be fitted: the model cannot be evaluated over the range of the set-up uncertainties; state smaller \
-             ones, or fit without Monte Carlo",
-            counted(draws.runs, "draw")
-        )));
+        return Err(IdentifyError::not_applicable(
+            "Monte Carlo",
+            format!("{unconverged} of {} cannot be fitted", counted(draws.runs, "draw")),
+            "the model cannot be evaluated over the range of the set-up uncertainties: state smaller ones, or fit without \
+             Monte Carlo",
+        ));
     }
     let parameters: Vec<DrawnParameter> = result
         .parameters

@@ -55,9 +55,7 @@ impl Given {
     /// If there is no `=`, no finite number or no unit.
     pub fn parse(text: &str) -> Result<Given, IdentifyError> {
         let Some((id, quantity)) = text.rsplit_once('=') else {
-            return Err(IdentifyError::Request(format!(
-                "`{text}` has no value; write name, number and unit as in `EY0A=35.3um`"
-            )));
+            return Err(IdentifyError::NotAQuantity { text: text.to_string(), fault: "has no value" });
         };
         Given::of(id.trim(), quantity)
     }
@@ -69,34 +67,30 @@ impl Given {
     pub fn of(id: &str, quantity: &str) -> Result<Given, IdentifyError> {
         let quantity = quantity.trim();
         if quantity.len() > MAX_BYTES {
-            return Err(IdentifyError::Request(format!(
-                "`{id}`: the number with its unit has {} bytes; the maximum is {MAX_BYTES}; write it as in `EY0A=35.3um`",
-                quantity.len()
-            )));
+            let found = format!("a number with its unit of {} bytes", quantity.len());
+            return Err(IdentifyError::TooLarge { name: id.to_string(), found, limit: format!("{MAX_BYTES} bytes") });
         }
         // The longest prefix that is a number: `1e3um` is a thousand µm, and an `e` that starts a unit is no exponent.
         let number = (1..=quantity.len()).rev().filter(|end| quantity.is_char_boundary(*end)).find_map(|end| {
             let value: f64 = quantity[..end].trim_end().parse().ok()?;
             Some((value, quantity[end..].trim()))
         });
+        let text = format!("{id}={quantity}");
+        let too_large = |name: String, found: String, limit: &str| {
+            Err(IdentifyError::TooLarge { name, found, limit: limit.to_string() })
+        };
         match number {
-            Some((value, _)) if value.is_finite() && value.abs() > LARGEST => Err(IdentifyError::Request(format!(
-                "`{id}={quantity}`: {} is too large; the maximum is {LARGEST:e}",
-                number_in_words(value)
-            ))),
-            Some((value, unit)) if longer_than_a_kilometre(value, unit) => Err(IdentifyError::Request(format!(
-                "`{id}={quantity}`: {} {unit} is too large; the limit is 1 km",
-                number_in_words(value)
-            ))),
+            Some((value, _)) if value.is_finite() && value.abs() > LARGEST => {
+                too_large(text, number_in_words(value), &format!("{LARGEST:e}"))
+            }
+            Some((value, unit)) if longer_than_a_kilometre(value, unit) => {
+                too_large(text, format!("{} {unit}", number_in_words(value)), "1 km")
+            }
             Some((value, unit)) if value.is_finite() && (!unit.is_empty() || value == 0.0) => {
                 Ok(Given { id: id.to_string(), value, unit: unit.to_string() })
             }
-            Some((value, "")) if value.is_finite() => Err(IdentifyError::Request(format!(
-                "`{id}={quantity}` has no unit; write the unit after the number, as in `{id}={quantity}um` or `{id}={quantity}arcsec`"
-            ))),
-            _ => Err(IdentifyError::Request(format!(
-                "`{id}={quantity}`: \"{quantity}\" is not a number with a unit; write it as in `EY0A=35.3um`"
-            ))),
+            Some((value, "")) if value.is_finite() => Err(IdentifyError::NotAQuantity { text, fault: "has no unit" }),
+            _ => Err(IdentifyError::NotAQuantity { text, fault: "is not a number with a unit" }),
         }
     }
 
@@ -124,10 +118,11 @@ impl Given {
         });
         match factor {
             Some(factor) => Ok(self.value * factor),
-            None => Err(IdentifyError::Request(format!(
-                "`{}` has the unit `{}`; a unit such as `{wanted}` is expected",
-                self.id, self.unit
-            ))),
+            None => Err(IdentifyError::OtherUnit {
+                name: self.id.clone(),
+                unit: self.unit.clone(),
+                expected: wanted.to_string(),
+            }),
         }
     }
 }

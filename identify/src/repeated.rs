@@ -173,16 +173,16 @@ pub fn compare(sessions: &[Session]) -> Result<Repeated, IdentifyError> {
 }
 
 fn one_session() -> IdentifyError {
-    IdentifyError::Request("one session has no scatter; give at least two sessions".into())
+    IdentifyError::TooFew { purpose: "the scatter of a parameter", what: "sessions", least: 2, found: 1 }
 }
 
 /// Checks that two sessions are repeats of one plan.
 fn same_plan(first: &Session, other: &Session) -> Result<(), IdentifyError> {
-    let fault = |what: String| {
-        IdentifyError::Request(format!(
-            "{} is not a repeat of {}: {what}; repeated sessions have the same machine, tests and parameters",
-            other.name, first.name
-        ))
+    let fault = |what: String| IdentifyError::Unlike {
+        one: other.name.clone(),
+        relation: "a repeat of",
+        other: first.name.clone(),
+        difference: format!("{what}; repeated sessions have the same machine, tests and parameters"),
     };
     if first.plan != other.plan {
         return Err(fault(format!("it is {}, not {}", other.plan, first.plan)));

@@ -133,7 +133,8 @@ const SETUP_STREAM: u128 = 0;
 /// not finite.
 pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated, IdentifyError> {
     if session.instruments().iter().any(|kind| !kind.entry().has_readings) {
-        return Err(IdentifyError::Request("a socket session has no readings to draw: its poses are its data".into()));
+        let found = "a socket session has no readings to draw";
+        return Err(IdentifyError::not_applicable("simulation", found, "its poses are its data"));
     }
     let planned = planned::planned_session(session)?;
     let mut given = Vec::with_capacity(simulation.given.len());
@@ -141,7 +142,7 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
     for value in &simulation.given {
         let id = result_id(&open, &value.id)?;
         if given.iter().any(|(known, _): &(String, &Given)| *known == id) {
-            return Err(IdentifyError::Request(format!("`{}` is given twice", value.id)));
+            return Err(IdentifyError::RepeatedUnknown { id: value.id.clone() });
         }
         if let Some(name) = ErrorName::parse(&id)
             && !open.unknowns.contains(&name)
@@ -265,13 +266,7 @@ fn result_id(session: &Session, id: &str) -> Result<String, IdentifyError> {
         .axis_index(&name.axis)
         .or_else(|| machine.axes.iter().position(|axis| axis.name.to_lowercase() == lower));
     let Some(axis) = axis else {
-        let axes: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
-        return Err(IdentifyError::Request(format!(
-            "`{id}`: the machine \"{}\" has no axis `{}`; its axes are {}",
-            machine.name,
-            name.axis,
-            axes.join(", ")
-        )));
+        return Err(IdentifyError::no_axis(machine, &format!("`{id}`: "), &name.axis));
     };
     name.axis.clone_from(&machine.axes[axis].name);
     Ok(name.to_string())
@@ -291,14 +286,20 @@ fn assign(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64])
         let (amplitude, phase) = (part("amplitude"), part("phase"));
         let Some(amplitude) = amplitude else {
             if phase.is_some() {
-                return Err(IdentifyError::Request(format!("`{id}.phase` has a value, but `{id}.amplitude` has none")));
+                return Err(IdentifyError::Missing {
+                    of: format!("`{id}`"),
+                    what: "amplitude beside its phase".to_string(),
+                    remedy: format!("give `{id}.amplitude`"),
+                });
             }
             continue;
         };
         if part("cos").is_some() || part("sin").is_some() {
-            return Err(IdentifyError::Request(format!(
-                "`{id}` is given by amplitude and by cosine or sine; give one or the other"
-            )));
+            return Err(IdentifyError::Contradictory {
+                one: format!("`{id}.amplitude`"),
+                other: format!("`{id}.cos` or `{id}.sin`"),
+                remedy: "give one or the other",
+            });
         }
         let Some(cosine) = find(&format!("{id}.cos")) else {
             continue;
@@ -329,7 +330,7 @@ fn assign(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64])
 
 /// The error for an identifier that the session lacks, with those that it has.
 fn unknown_identifier(parameters: &Parameters, id: &str) -> IdentifyError {
-    let of = |coefficients: bool| {
+    let of_role = |coefficients: bool| {
         let chosen = parameters.list.iter().filter(|parameter| match parameter.role {
             Role::Coefficient { .. } => coefficients,
             Role::Setup => !coefficients,
@@ -337,15 +338,12 @@ fn unknown_identifier(parameters: &Parameters, id: &str) -> IdentifyError {
         });
         chosen.map(|parameter| parameter.id.as_str()).collect::<Vec<_>>()
     };
-    let known = if id.contains('~') {
-        match of(true) {
-            none if none.is_empty() => "it declares no [[effect]]".to_string(),
-            names => format!("coefficients of its effects are {}", names.join(", ")),
-        }
-    } else {
-        format!("errors are named as in EY0A; set-up quantities are {}", of(false).join(", "))
+    let of_effect = id.contains('~');
+    let these = match of_effect {
+        true => "coefficients of its effects are",
+        false => "errors are named as in EY0A; set-up quantities are",
     };
-    IdentifyError::Request(format!("the session has no `{id}`; {known}"))
+    IdentifyError::unknown("the session", "parameter", id, these, of_role(of_effect))
 }
 
 /// Warnings about values without an effect on the readings, and declared effects without a value.

@@ -20,6 +20,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::PlanError;
+use abbe_identify::IdentifyError;
 use abbe_identify::candidates::columns::Columns;
 use abbe_identify::candidates::library;
 use abbe_identify::linear::{Linearisation, is_of_interest};
@@ -130,11 +131,10 @@ pub fn bias_table(problem: &Problem, effects: &[Effect]) -> Result<BiasTable, Pl
     let mut rows = Vec::new();
     for effect in effects {
         let Some(set) = columns.effect_columns(effect) else {
-            return Err(PlanError::Request(format!(
-                "`{}`: a test of the plan has no column for `{}`; give the column, or leave the effect out",
-                effect.id(),
-                effect.driver
-            )));
+            let (of, what) =
+                (format!("`{}`: a test of the plan", effect.id()), format!("column for `{}`", effect.driver));
+            let remedy = "give the column, or leave the effect out".to_string();
+            return Err(IdentifyError::Missing { of, what, remedy }.into());
         };
         let mut changes = Mat::zeros(columns.rows(), set.count);
         columns.fill(&[&set], changes.as_mut());

@@ -6,10 +6,12 @@ use abbe_model::instrument::ballbar::{BAR, BallBar};
 use abbe_model::session::expression::Length;
 use abbe_model::session::motion::{FollowOffset, Motion};
 use abbe_model::session::{Prior, Session, Test, placing};
+use abbe_model::words::{counted, listed};
 
 use super::ball_positions::{BallPosition, axis_positions, ball_positions, dot, norm, standing_positions};
 use super::sweep::{Sweep, sweep_of};
 use super::test_variations::TestVariations;
+use crate::PlanError;
 
 /// Least radius about the swept axis, mm. At smaller radii the bar hardly moves.
 const MIN_RADIUS_MM: f64 = 10.0;
@@ -30,6 +32,19 @@ pub(super) struct Draft {
 
 /// Largest number of combinations of the permitted choices. A candidate with its positions takes some 20 kB.
 pub(super) const MAX_DRAFTS: usize = 100_000;
+
+/// The error of more combinations than [`MAX_DRAFTS`], with the lists whose lengths multiply.
+pub(super) fn too_many(found: String, variations: &TestVariations, with_bars: bool) -> PlanError {
+    let lists = [
+        counted(variations.bars_mm.len(), "bar"),
+        counted(variations.radii_mm.len(), "distance of the ball from its axis"),
+        counted(variations.heights_mm.len(), "height"),
+        counted(variations.feeds.len(), "feed"),
+        counted(variations.ranges.len(), "share of the range"),
+    ];
+    let remedy = format!("state fewer of the {}", listed(&lists[usize::from(!with_bars)..], "and"));
+    PlanError::TooMany { found, limit: MAX_DRAFTS, remedy }
+}
 
 /// The largest possible number of combinations of the permitted choices, counted before any is made.
 pub(super) fn draft_count(session: &Session, variations: &TestVariations) -> f64 {

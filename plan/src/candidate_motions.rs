@@ -24,10 +24,10 @@ use abbe_model::instrument::{Following, InstrumentKind, Station, Travel};
 use abbe_model::session::expression::Length;
 use abbe_model::session::motion::{FollowOffset, Motion};
 use abbe_model::session::{Prior, Session, Test, placing};
-use abbe_model::words::{counted, listed, number};
+use abbe_model::words::{listed, number};
 
 use super::ball_positions::{BallPosition, axis_positions, ball_positions, dot, standing_positions};
-use super::candidate_layout::{Draft, MAX_DRAFTS};
+use super::candidate_layout::{Draft, MAX_DRAFTS, too_many};
 use super::test_variations::TestVariations;
 use crate::PlanError;
 
@@ -91,15 +91,8 @@ pub(super) fn drafts(
     let count = templates.iter().map(Template::count_of_one_axis).sum::<usize>()
         + in_contact.as_ref().map_or(0, Contacts::count);
     if count > MAX_DRAFTS {
-        let TestVariations { radii_mm, heights_mm, feeds, ranges, .. } = variations;
-        return Err(PlanError::Request(format!(
-            "some {count} candidate tests of {}; the limit is {MAX_DRAFTS}: state fewer of the {}, {}, {} and {}",
-            kind.entry().phrase,
-            counted(radii_mm.len(), "distance of the ball from its axis"),
-            counted(heights_mm.len(), "height"),
-            counted(feeds.len(), "feed"),
-            counted(ranges.len(), "share of the range"),
-        )));
+        let found = format!("some {count} candidate tests of {}", kind.entry().phrase);
+        return Err(too_many(found, variations, false));
     }
     let mut drafts: Vec<Draft> = templates.iter().flat_map(Template::moves_of_one_axis).collect();
     drafts.extend(in_contact.iter().flat_map(Contacts::drafts));

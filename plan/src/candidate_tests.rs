@@ -10,9 +10,9 @@ use std::sync::Arc;
 
 use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::{Session, Test, planned};
-use abbe_model::words::{counted, number};
+use abbe_model::words::number;
 
-use super::candidate_layout::{Draft, MAX_DRAFTS, draft_count, drafts};
+use super::candidate_layout::{Draft, MAX_DRAFTS, draft_count, drafts, too_many};
 use super::candidate_motions;
 use super::collision::{Bodies, Parts};
 use super::states;
@@ -53,11 +53,7 @@ pub fn candidate_tests(session: &Session, variations: &TestVariations) -> Result
     let finished = parallel::map(drafts.len(), &|k| finished(session, &bodies, variations, drafts[k].clone()));
     let tests: Vec<CandidateTest> = finished.into_iter().flatten().collect();
     if tests.is_empty() {
-        return Err(PlanError::Request(
-            "no candidate test is feasible on this machine: the instrument reads no motion of its axes, no bar reaches, the \
-             travel is too short, or no test clears the bodies of the machine"
-                .to_string(),
-        ));
+        return Err(PlanError::NoCandidateTest);
     }
     Ok(tests)
 }
@@ -66,16 +62,7 @@ pub fn candidate_tests(session: &Session, variations: &TestVariations) -> Result
 fn with_bar(session: &Session, variations: &TestVariations, last: &Test) -> Result<Vec<Draft>, PlanError> {
     let count = draft_count(session, variations);
     if count > MAX_DRAFTS as f64 {
-        let TestVariations { bars_mm, radii_mm, heights_mm, feeds, ranges, .. } = variations;
-        return Err(PlanError::Request(format!(
-            "up to {} candidate tests; the limit is {MAX_DRAFTS}: state fewer of the {}, {}, {}, {} and {}",
-            number(count),
-            counted(bars_mm.len(), "bar"),
-            counted(radii_mm.len(), "distance of the ball from its axis"),
-            counted(heights_mm.len(), "height"),
-            counted(feeds.len(), "feed"),
-            counted(ranges.len(), "share of the range"),
-        )));
+        return Err(too_many(format!("up to {} candidate tests", number(count)), variations, true));
     }
     Ok(drafts(session, variations, last))
 }

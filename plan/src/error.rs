@@ -36,9 +36,22 @@ pub enum PlanError {
         /// What may be wrong.
         check: &'static str,
     },
-    /// The request is invalid.
-    #[error("{0}")]
-    Request(String),
+    /// No candidate test is feasible.
+    #[error(
+        "no candidate test is feasible on this machine: the instrument reads no motion of its axes, no bar reaches, the \
+         travel is too short, or no test clears the bodies of the machine"
+    )]
+    NoCandidateTest,
+    /// More work than a limit allows.
+    #[error("{found}; the limit is {limit}: {remedy}")]
+    TooMany {
+        /// What would be computed, with its number.
+        found: String,
+        /// The limit of that number.
+        limit: usize,
+        /// What to do.
+        remedy: String,
+    },
 }
 
 impl From<ModelError> for PlanError {

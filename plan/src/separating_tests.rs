@@ -52,7 +52,11 @@ pub fn separate_aliases(
                     test.proposal = proposal;
                 }
             }
-            Err(PlanError::Request(_) | PlanError::Identify(IdentifyError::Interrupted)) => break,
+            Err(
+                PlanError::NoCandidateTest
+                | PlanError::TooMany { .. }
+                | PlanError::Identify(IdentifyError::Interrupted),
+            ) => break,
             Err(error) => return Err(error),
         }
     }

@@ -104,7 +104,7 @@ def test_compare_and_export(results, tmp_path):
         model.export("linuxcnc", entries="all")
     with pytest.raises(ValueError, match="`travel` belongs to"):
         model.export("urdf", travel={"A": (-90, 90)})
-    with pytest.raises(abbe.Error, match="no such axis"):
+    with pytest.raises(abbe.Error, match="has no axis `B`"):
         model.export("linuxcnc", travel={"B": (-90, 90)})
     with pytest.raises(abbe.Error, match="not below the second"):
         model.export("linuxcnc", travel={"A": (90, -90)})

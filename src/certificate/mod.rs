@@ -309,10 +309,10 @@ impl<'c> Stated<'c> {
     pub fn of(certificate: &'c Certificate, session: &Session) -> Result<Stated<'c>, IdentifyError> {
         let about = |name: &str| session.about.iter().find(|(known, _)| known == name).map(|(_, text)| text.as_str());
         let lacking = |key: &str, table: &str, note: &str| {
-            IdentifyError::Request(format!(
-                "the certificate has no {key}: state it in `[{table}]` of the file of the certificate, or as `{note}` in \
-                 `[about]` of the session"
-            ))
+            let remedy = format!(
+                "state it in `[{table}]` of the file of the certificate, or as `{note}` in `[about]` of the session"
+            );
+            IdentifyError::Missing { of: "the certificate".to_string(), what: key.to_string(), remedy }
         };
         let head = &certificate.certificate;
         let begin = match &head.begin {
@@ -323,8 +323,9 @@ impl<'c> Stated<'c> {
         let end = head.end.as_deref().and_then(day).unwrap_or_else(|| begin.clone());
         // Days of this form are in the order of their texts.
         if end < begin {
-            let why = format!("the measurement ends on {end} (`end`) before it begins on {begin}");
-            return Err(IdentifyError::Request(why));
+            let (one, other) = (format!("`end` on {end}"), format!("`begin` on {begin}"));
+            let remedy = "the measurement ends after it begins";
+            return Err(IdentifyError::Contradictory { one, other, remedy });
         }
         let noted = about("serial_number").map(str::trim).filter(|number| is_text(number));
         let number = certificate.item.serial_number.as_deref().or(noted);
@@ -340,7 +341,7 @@ impl<'c> Stated<'c> {
     /// If the readings contradict the session, if the model lacks an effect or that cannot be judged, or if no error is
     /// determined.
     pub fn xml(&self, problem: &Problem, result: &FitResult) -> Result<String, IdentifyError> {
-        let refused = |why: &str| Err(IdentifyError::Request(format!("there is no certificate: {why}")));
+        let refused = |why| Err(IdentifyError::NoCertificate { why });
         if let Some(why) = result.outcome.goodness.verdict.forbids_decisions() {
             return refused(why);
         }
@@ -369,6 +370,6 @@ impl<'c> Stated<'c> {
             coefficients,
             open,
         })
-        .map_err(|cause| IdentifyError::Request(format!("the certificate cannot be written: {cause}")))
+        .map_err(|cause| IdentifyError::Write { what: "the certificate", cause })
     }
 }

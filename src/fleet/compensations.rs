@@ -36,7 +36,9 @@ pub fn of_source(source: &Source) -> Result<Vec<Compensation>, FleetError> {
         unit: String,
     }
     let name = source.file.display();
-    let fault = |line: usize, what: String| FleetError::Request(format!("{name}:{line}: {what}"));
+    let fault = |line: usize, found: String, expected: &str| {
+        FleetError::unusable(format_args!("{name}:{line}"), found, expected)
+    };
     let mut contents = source.text.clone();
     // The line of a row is that before the place of the reader behind it.
     if !contents.ends_with('\n') {
@@ -46,7 +48,7 @@ pub fn of_source(source: &Source) -> Result<Vec<Compensation>, FleetError> {
     let mut reader =
         csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(contents.as_bytes());
     let expected = |line: usize, error: &dyn std::fmt::Display| {
-        fault(line, format!("{error}; columns {} are expected", COLUMNS.join(", ")))
+        fault(line, error.to_string(), &format!("columns {} are expected", COLUMNS.join(", ")))
     };
     let columns = reader.headers().map_err(|error| expected(1, &error))?.clone();
     // A header without rows is checked too.
@@ -61,10 +63,10 @@ pub fn of_source(source: &Source) -> Result<Vec<Compensation>, FleetError> {
             break;
         }
         let row: Row = cells.deserialize(Some(&columns)).map_err(|error| expected(line, &error))?;
-        let days = date::interval(&row.date)
-            .ok_or_else(|| fault(line, format!("date `{}`: the form 2026-11-23T08:00:00 is expected", row.date)))?;
+        let no_date = || fault(line, format!("date `{}`", row.date), "the form 2026-11-23T08:00:00 is expected");
+        let days = date::interval(&row.date).ok_or_else(no_date)?;
         if !row.change.is_finite() {
-            return Err(fault(line, format!("change `{}`: a number is expected", row.change)));
+            return Err(fault(line, format!("change `{}`", row.change), "a number is expected"));
         }
         let known = found.iter_mut().find(|known| known.machine_id == row.machine_id && known.days == days);
         let change =
@@ -72,7 +74,8 @@ pub fn of_source(source: &Source) -> Result<Vec<Compensation>, FleetError> {
         match known {
             Some(known) if known.changes.iter().any(|other| other.id == change.id) => {
                 let (id, date) = (&change.id, &row.date);
-                return Err(fault(line, format!("the change of {id} on {date} is stated twice: remove a row")));
+                let found = format!("the change of {id} on {date} is stated twice");
+                return Err(fault(line, found, "remove a row"));
             }
             Some(known) => known.changes.push(change),
             None => found.push(Compensation { machine_id: row.machine_id, days, changes: vec![change] }),

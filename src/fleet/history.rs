@@ -124,10 +124,7 @@ pub fn history(store: &Store, machine_id: Option<&str>, options: &HistoryOptions
     let all = records.len();
     let known: BTreeSet<String> = records.iter().map(|(_, record)| record.machine_id.clone()).collect();
     if let Some(id) = machine_id.filter(|id| !known.contains(*id)) {
-        return Err(FleetError::Request(format!(
-            "no session of the machine `{id}` among {all}: the identifier is `serial_number` of [about], or the name \
-             of the machine"
-        )));
+        return Err(FleetError::UnknownMachine { id: id.to_string(), sessions: all });
     }
     let mut machines: BTreeMap<String, Vec<Dated>> = BTreeMap::new();
     for dated in usable(records, &mut not_used) {
@@ -166,10 +163,9 @@ fn check_units(machines: &[MachineSessions], compensations: &[Compensation]) -> 
         let of_machine = machines.iter().filter(|machine| machine.machine_id == known.machine_id);
         for (id, unit, _) in of_machine.flat_map(|machine| &machine.parameters) {
             if let Some(stated) = known.changes.iter().find(|known| known.id == *id && known.unit != *unit) {
-                return Err(FleetError::Request(format!(
-                    "{}: compensation of {}: the change of {id} is stated in `{}`; state it in {unit}",
-                    stated.source, known.machine_id, stated.unit
-                )));
+                let (machine, stated_in) = (&known.machine_id, &stated.unit);
+                let found = format!("compensation of {machine}: the change of {id} is stated in `{stated_in}`");
+                return Err(FleetError::unusable(&stated.source, found, format!("state it in {unit}")));
             }
         }
     }

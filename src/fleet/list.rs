@@ -27,10 +27,8 @@ pub fn sessions(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FleetError> {
             let before = found.len();
             below(path, &mut found);
             if found.len() == before {
-                return Err(FleetError::Request(format!(
-                    "{}: no {SESSION_FILE} lies in this folder or below; name session files",
-                    path.display()
-                )));
+                let found = format!("no {SESSION_FILE} lies in this folder or below");
+                return Err(FleetError::unusable(path.display(), found, "name session files"));
             }
         } else {
             found.push(path.clone());
@@ -54,14 +52,17 @@ pub fn chosen(
     // A file of a list may be gone since the list was made: it is a result with its error. A path that is typed is a
     // mistake.
     if let Some(path) = typed.iter().find(|path| matches!(path.try_exists(), Ok(false))) {
-        let message = format!("{}: neither a session file nor a folder is there; correct the path", path.display());
-        return Err(FleetError::Request(message));
+        return Err(FleetError::unusable(
+            path.display(),
+            "neither a session file nor a folder is there",
+            "correct the path",
+        ));
     }
     let mut paths = typed.to_vec();
     paths.extend(list.map_or(Ok(Vec::new()), listed)?);
     let files = sessions(&paths)?;
     if files.is_empty() && part.is_none() {
-        return Err(FleetError::Request("no session is named; name session files or folders".into()));
+        return Err(FleetError::NoSession);
     }
     let (first, every) = part.map_or((0, 1), |(k, n)| (k - 1, n));
     Ok((paths, files.into_iter().skip(first).step_by(every).collect()))
@@ -83,10 +84,8 @@ pub fn listed(file: &Path) -> Result<Vec<PathBuf>, FleetError> {
     let lines = || text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
     let count = lines().count();
     if text.len() as u64 > MAX_BYTES || count > MAX_PATHS {
-        return Err(FleetError::Request(format!(
-            "{}: a list has at most {MAX_PATHS} paths and {MAX_BYTES} bytes; name folders, or split the list",
-            file.display()
-        )));
+        let found = format!("a list has at most {MAX_PATHS} paths and {MAX_BYTES} bytes");
+        return Err(FleetError::unusable(file.display(), found, "name folders, or split the list"));
     }
     Ok(lines().map(PathBuf::from).collect())
 }

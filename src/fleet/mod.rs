@@ -54,7 +54,37 @@ pub enum FleetError {
     /// A document that cannot be used.
     #[error(transparent)]
     Model(#[from] abbe_model::ModelError),
-    /// A request that cannot be met.
-    #[error("{0}")]
-    Request(String),
+    /// A folder, a file, or a line of a file that is not what is expected.
+    #[error("{place}: {found}; {expected}")]
+    Unusable {
+        /// The folder, or the file, with the line.
+        place: String,
+        /// What was found.
+        found: String,
+        /// What is expected, or what to do.
+        expected: String,
+    },
+    /// No session is named.
+    #[error("no session is named; name session files or folders")]
+    NoSession,
+    /// A machine without sessions.
+    #[error(
+        "no session of the machine `{id}` among {sessions}: the identifier is `serial_number` of [about], or the name of the \
+         machine"
+    )]
+    UnknownMachine {
+        /// The identifier as given.
+        id: String,
+        /// The number of sessions.
+        sessions: usize,
+    },
+    /// The threads cannot be started.
+    #[error("the threads cannot be started: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+}
+
+impl FleetError {
+    fn unusable(place: impl std::fmt::Display, found: impl Into<String>, expected: impl Into<String>) -> FleetError {
+        FleetError::Unusable { place: place.to_string(), found: found.into(), expected: expected.into() }
+    }
 }

@@ -43,10 +43,7 @@ pub fn all<U: Sync, T: Send>(
     };
     let pool = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool,
-        Err(cause) => {
-            let ended = Some(FleetError::Request(format!("the threads cannot be started: {cause}")));
-            return Pooled { done: Vec::new(), ended };
-        }
+        Err(cause) => return Pooled { done: Vec::new(), ended: Some(cause.into()) },
     };
     let mut outcomes: Vec<Result<Option<T>, FleetError>> =
         pool.install(|| units.par_iter().with_max_len(1).map(|own| one(own, IfClaimed::Skip)).collect());

@@ -147,10 +147,8 @@ impl Store {
     pub fn existing(folder: impl Into<PathBuf>) -> Result<Store, FleetError> {
         let folder = folder.into();
         if !folder.join("sessions").is_dir() {
-            return Err(FleetError::Request(format!(
-                "{}: no results of `abbe fleet run` are there; name its folder of --out",
-                folder.display()
-            )));
+            let found = "no results of `abbe fleet run` are there";
+            return Err(FleetError::unusable(folder.display(), found, "name its folder of --out"));
         }
         Ok(Store { folder })
     }

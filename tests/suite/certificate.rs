@@ -127,7 +127,7 @@ fn what_no_measurement_tells_is_asked_for_before_the_fit() {
     refused(Some(&EXAMPLE.replace("custome", "costume")), &["costumer", "customer"]);
     refused(Some(&EXAMPLE.replace("serial_number = \"17-331\"\n", "")), &["serial_number", "[item]", "[about]"]);
     let ended = EXAMPLE.replace("begin = \"2026-11-23\"", "begin = \"2026-11-23\"\nend = \"2026-01-01\"");
-    refused(Some(&ended), &["2026-01-01", "before it begins on 2026-11-23"]);
+    refused(Some(&ended), &["`end` on 2026-01-01", "`begin` on 2026-11-23"]);
     refused(Some(&EXAMPLE.replace("[19.6, 20.3]", "[20.3, 19.6]")), &["temperature_c", "lowest and the highest"]);
     refused(Some(&EXAMPLE.replace("A. Example", "")), &["name", "text without blanks"]);
     refused(None, &["certificate.toml", "[laboratory]", "[[person]]"]);

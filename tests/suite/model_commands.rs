@@ -248,7 +248,7 @@ fn entries_of_a_control_state_what_remains() {
     assert!(jsonschema::is_valid(&schema, &serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap()));
     for (format, option, because) in [
         ("fanuc", "--travel=A=60..-30", "the first number is not below the second"),
-        ("fanuc", "--travel=Q=0..1", "no such axis"),
+        ("fanuc", "--travel=Q=0..1", "has no axis `Q`; its axes are"),
         ("fanuc", "--travel=A=x..1", "no two numbers"),
         ("dh", "--travel=A=0..1", "belongs to `--as linuxcnc`"),
         ("beckhoff", "--entries=plain", "belongs to `--as linuxcnc`"),

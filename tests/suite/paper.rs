@@ -140,7 +140,7 @@ fn invalid_requests_are_refused() {
         (vec!["--parts", "comparison"], 2, "two sessions"),
         (vec!["--parts", "trace"], 1, "no readings"),
         (vec!["--parts", "nothing"], 2, "identifiability"),
-        (vec!["--effects", "EZC~C:h0"], 1, "not in the library"),
+        (vec!["--effects", "EZC~C:h0"], 1, "has no effect `EZC~C:h0`"),
         (vec![plan], 1, "named twice"),
     ] {
         let output = abbe(&[vec!["paper", plan, "--out", out], arguments].concat());

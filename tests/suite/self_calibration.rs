@@ -419,7 +419,7 @@ fn noise_that_is_not_stated_follows_from_repeated_cycles() {
 fn a_session_of_another_kind_is_refused_with_a_remedy() {
     let refused = |session: &Session| Equations::of(session).unwrap_err().to_string();
     let bar = files::session(&ready("hermle-c600u/measured/session.toml"), &ReadOptions::default()).unwrap();
-    assert!(refused(&bar).contains("instrument is a ballbar"));
+    assert!(refused(&bar).contains("instrument `ballbar`, not `probe`"));
     assert!(refused(&plan(8, 45.0)).contains("no readings"));
     let mut two = unmoved(8, 45.0);
     two.tests[1].setup = "another".into();
@@ -436,5 +436,5 @@ fn a_session_of_another_kind_is_refused_with_a_remedy() {
         "20000",
     ]);
     assert_eq!(output.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("instrument is a ballbar"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("instrument `ballbar`, not `probe`"));
 }

@@ -164,9 +164,10 @@ fn invalid_simulations_are_refused_and_nothing_is_written() {
         (&["--error", "EY0A"], "has no value"),
         (&["--error", "EY0A=1arcsec"], "`EY0A` has the unit `arcsec`; a unit such as `um` is expected"),
         (&["--error", "e_y0a=1um", "--error", "EY0A=2um"], "is given twice"),
-        (&["--error", "bra=1um"], "the session has no `bra`"),
+        (&["--error", "bra=1um"], "the session has no parameter `bra`"),
         (&["--effect", "EZC~C:h3.amplitude=1um"], "coefficients of its effects are EZC~C:h2.cos, EZC~C:h2.sin"),
-        (&["--effect", "EZC~C:h2.phase=1deg"], "`EZC~C:h2.phase` has a value, but `EZC~C:h2.amplitude` has none"),
+        (&["--effect", "EZC~C:h2.coss=1um"], "EZC~C:h2.sin; did you mean `EZC~C:h2.cos`?"),
+        (&["--effect", "EZC~C:h2.phase=1deg"], "`EZC~C:h2` has no amplitude beside its phase; give"),
         (&["--noise-um", "-1"], "a standard deviation in µm is expected"),
     ] {
         let stderr = refused(&plan, &out, more);

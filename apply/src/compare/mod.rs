@@ -30,6 +30,7 @@ use abbe_model::chain::Machine;
 use faer::Mat;
 
 use crate::ApplyError;
+use abbe_identify::IdentifyError;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::numerics::symmetric::Symmetric;
 use abbe_identify::numerics::tails::{chi_square_tail, normal_tail};
@@ -80,7 +81,14 @@ pub fn one_machine(a: (&str, &Machine), b: (&str, &Machine)) -> Result<(), Apply
     if apart.is_empty() {
         return Ok(());
     }
-    Err(ApplyError::Request(format!("a comparison needs sessions and models of one machine: {}", apart.join("; "))))
+    let (one, other) = (b.0.to_string(), a.0.to_string());
+    Err(IdentifyError::Unlike { one, relation: "of one machine with", other, difference: apart.join("; ") }.into())
+}
+
+/// Two models in which nothing can be compared.
+fn apart(a: &Named<'_>, b: &Named<'_>, difference: &str) -> ApplyError {
+    let (one, other) = (b.name.clone(), a.name.clone());
+    IdentifyError::Unlike { one, relation: "comparable with", other, difference: difference.to_string() }.into()
 }
 
 /// Compares each model with the first one.
@@ -88,12 +96,10 @@ pub fn one_machine(a: (&str, &Machine), b: (&str, &Machine)) -> Result<(), Apply
 /// # Errors
 /// If there are fewer than two models, they are not of one machine, or nothing in them can be compared.
 pub fn compare(models: &[Named<'_>], options: &CompareOptions) -> Result<Comparison, ApplyError> {
-    let [first, others @ ..] = models else {
-        return Err(ApplyError::Request("a comparison needs two models or sessions".into()));
+    let (Some(first), Some(others @ [_, ..])) = (models.first(), models.get(1..)) else {
+        let (purpose, found) = ("a comparison", models.len());
+        return Err(IdentifyError::TooFew { purpose, what: "models or sessions", least: 2, found }.into());
     };
-    if others.is_empty() {
-        return Err(ApplyError::Request("a comparison needs two models or sessions".into()));
-    }
     let mut comparison = Comparison {
         significance: options.significance,
         inputs: models.iter().map(|named| named.name.clone()).collect(),
@@ -121,10 +127,7 @@ struct Compared {
 fn pair(a: &Named<'_>, b: &Named<'_>, options: &CompareOptions) -> Result<Compared, ApplyError> {
     let common = common(a.model, b.model);
     if common.is_empty() {
-        return Err(ApplyError::Request(format!(
-            "{} and {} have no parameter of the machine in common: identify the same errors in both",
-            a.name, b.name
-        )));
+        return Err(apart(a, b, "no parameter of the machine is in common; identify the same errors in both"));
     }
     let SharedDifference { mut delta, mut covariance, shared, refuted } =
         shared::difference(a.model, b.model, &common, options.shared.as_deref())?;
@@ -152,11 +155,9 @@ fn pair(a: &Named<'_>, b: &Named<'_>, options: &CompareOptions) -> Result<Compar
     holm(&mut differences, options.significance);
     let kept: Vec<usize> = (0..common.len()).filter(|k| !held.contains(k) && covariance[(*k, *k)] > 0.0).collect();
     if kept.is_empty() {
-        return Err(ApplyError::Request(format!(
-            "no parameter of the machine is determined by both {} and {}, so nothing can be compared: measure what \
-             separates the errors, or identify fewer of them",
-            a.name, b.name
-        )));
+        let difference = "no parameter of the machine is determined by both, so nothing can be compared; measure what \
+                          separates the errors, or identify fewer of them";
+        return Err(apart(a, b, difference));
     }
     let (chi_square, degrees_of_freedom) = chi_square(&delta, &covariance, &kept)?;
     let only = |own: &IdentifiedModel, of: &Named<'_>, side: fn(&(usize, usize)) -> usize| -> Vec<OnlyIn> {

@@ -20,6 +20,7 @@ use faer::Mat;
 
 use super::results::NotShared;
 use crate::ApplyError;
+use abbe_identify::IdentifyError;
 use abbe_identify::model_file::{IdentifiedModel, ModelParameter};
 use abbe_identify::numerics::symmetric::pseudo_inverse;
 use abbe_identify::numerics::tails::normal_tail;
@@ -193,19 +194,16 @@ fn shared(
     let thing = |i: usize| thing(a, i);
     let things_stated = things.unwrap_or_default();
     if things_stated.len() > 1 && things_stated.iter().any(|stated| stated == NOTHING) {
-        return Err(ApplyError::Request(format!(
-            "shared set-up quantities are stated beside \"{NOTHING}\", which says that there are none; state either"
-        )));
+        let (one, other) = ("shared set-up quantities".to_string(), format!("\"{NOTHING}\""));
+        return Err(IdentifyError::Contradictory { one, other, remedy: "state either" }.into());
     }
     for stated in things_stated.iter().filter(|stated| *stated != NOTHING) {
         if !of_both.iter().any(|(i, _)| thing(*i) == stated) {
             let mut known: Vec<&str> = of_both.iter().map(|(i, _)| thing(*i)).collect();
             known.sort_unstable();
             known.dedup();
-            let known = if known.is_empty() { NOTHING.to_string() } else { known.join(", ") };
-            return Err(ApplyError::Request(format!(
-                "the shared set-up quantity \"{stated}\" is not estimated with the same prior in both; these are: {known}"
-            )));
+            let what = "set-up quantity with the same prior in both called";
+            return Err(IdentifyError::unknown("the pair of models", what, stated, "these are:", known).into());
         }
     }
     of_both.retain(|(i, _)| match things {

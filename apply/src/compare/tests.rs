@@ -156,7 +156,7 @@ fn differences_do_not_depend_on_the_gauge() {
     let options = CompareOptions { places: 0, shared: none, ..CompareOptions::default() };
     let unknown = CompareOptions { shared: Some(vec!["ball".to_string()]), ..options.clone() };
     let refused = compare(&named, &unknown).unwrap_err().to_string();
-    assert!(refused.contains("\"ball\" is not estimated"), "{refused}");
+    assert!(refused.contains("with the same prior in both called `ball`"), "{refused}");
     assert!(refused.ends_with("these are: bar, spindle_ball, workpiece_ball"), "{refused}");
     let both = CompareOptions { shared: Some(vec!["bar".to_string(), "none".to_string()]), ..options.clone() };
     assert!(compare(&named, &both).unwrap_err().to_string().contains("state either"));

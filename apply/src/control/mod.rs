@@ -58,7 +58,10 @@ impl Control {
         travel: &Travel,
         tool_mm: [f64; 3],
     ) -> Result<KinematicTable, ApplyError> {
-        let refused = |why: &str| Err(ApplyError::Request(format!("no table for `{}`: {why}", self.word)));
+        let refused = |holds: &str| {
+            let format = format!("a table for `{}`", self.word);
+            Err(ApplyError::unrepresentable(format, "kinematic parameters", holds))
+        };
         match &self.kinematics {
             Kinematics::Entries(kinematics) => table(model, self.name, kinematics, choice, travel, tool_mm),
             Kinematics::Locations => refused("it takes location errors in its compensation tables"),

@@ -157,10 +157,8 @@ impl Correction<'_> {
         let machine = self.machine;
         let axes = self.aim.axes(machine);
         if axes.len() > MAX_AXES {
-            return Err(ApplyError::Request(format!(
-                "compensation: the machine has {} axes, at most {MAX_AXES} are supported",
-                axes.len()
-            )));
+            let (name, range) = ("compensation".to_string(), [1.0, MAX_AXES as f64]);
+            return Err(IdentifyError::OutOfRange { name, found: axes.len() as f64, range, unit: "axes" }.into());
         }
         let errors = self.errors.along(commanded)?;
         let linear = Aim::Position.axes(machine);

@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::{Correction, State};
 use crate::ApplyError;
+use abbe_identify::IdentifyError;
 use abbe_identify::numerics::parallel;
 use abbe_identify::unit::ARCSEC;
 use abbe_model::pose::{Aim, Pose, reach};
@@ -96,17 +97,21 @@ pub fn run(
 ) -> Result<Summary, ApplyError> {
     check(correction, file.poses())?;
     if let Some(effect) = correction.errors.with_history() {
-        return Err(ApplyError::Request(format!(
-            "the effect {effect} follows its driver with a lag, which depends on all commands before; save a model in \
-             which it follows the driver without delay"
-        )));
+        return Err(ApplyError::unrepresentable(
+            "the compensation",
+            format!("the effect {effect}"),
+            "it follows its driver with a lag, which depends on all commands before; save a model in which it follows the \
+             driver without delay",
+        ));
     }
     let layout = Layout::of(correction, file, output);
     if let Some(name) = output.columns().iter().find(|name| file.header().iter().any(|own| own == **name)) {
-        return Err(ApplyError::Request(format!(
-            "the commands have a column `{name}`, which the output adds: the file may be corrected already; remove the \
-             column or give it another name"
-        )));
+        return Err(IdentifyError::not_applicable(
+            format!("the commands have a column `{name}`, which the output adds"),
+            "the file may be corrected already",
+            "remove the column or give it another name",
+        )
+        .into());
     }
     write(to, layout.header(file).as_bytes())?;
     let mut summary = Summary::default();
@@ -144,7 +149,7 @@ pub fn run(
 }
 
 fn write(to: &mut dyn Write, bytes: &[u8]) -> Result<(), ApplyError> {
-    to.write_all(bytes).map_err(|cause| ApplyError::Request(format!("the output cannot be written: {cause}")))
+    to.write_all(bytes).map_err(|cause| IdentifyError::Write { what: "the output", cause }.into())
 }
 
 fn check(correction: &Correction<'_>, poses: PoseColumns) -> Result<(), ApplyError> {
@@ -162,7 +167,8 @@ fn check(correction: &Correction<'_>, poses: PoseColumns) -> Result<(), ApplyErr
         Aim::PositionAndAxis => "px_mm, py_mm, pz_mm and the direction of the tool's Z, i, j, k",
         Aim::Pose => "px_mm, py_mm, pz_mm and a quaternion, qw, qx, qy, qz",
     };
-    Err(ApplyError::Request(format!("poses of this machine's tool are stated by {needs}")))
+    let format = "the columns of the commands";
+    Err(ApplyError::unrepresentable(format, "poses of this machine's tool", format!("these are stated by {needs}")))
 }
 
 /// Replaces the poses of a block by axis positions. Returns whether each row is out of reach; nothing for a file of

@@ -12,6 +12,7 @@
 //! The nominal table is the maker's own, or one that follows from the nominal machine (`dh_nominal`). The frames of
 //! the calibrated table are those of its lines that lie nearest to the nominal ones (`dh_frames`).
 
+use abbe_identify::IdentifyError;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName};
@@ -148,11 +149,11 @@ pub fn tables(
     let machine = &model.machine;
     let rotary = machine.axes.iter().all(|axis| axis.kind == AxisKind::Rotary);
     if !rotary || machine.workpiece_side > 0 || machine.axes.is_empty() {
-        return Err(ApplyError::Request(format!(
-            "Denavit–Hartenberg parameters are those of a chain of rotary axes on the tool side; this machine is `{}`; \
-             use URDF",
-            machine.code()
-        )));
+        return Err(ApplyError::unrepresentable(
+            "a table of Denavit–Hartenberg parameters",
+            format!("the machine `{}`", machine.code()),
+            "it is that of a chain of rotary axes on the tool side; use URDF",
+        ));
     }
     let names: Vec<String> = machine.axes.iter().map(|axis| axis.name.clone()).collect();
     let zero = vec![0.0; machine.error_slots()];
@@ -213,8 +214,10 @@ fn of_maker(
     convention: Convention,
     end: Isometry3<f64>,
 ) -> Result<Frames, ApplyError> {
-    let refused =
-        |why: String| Err(ApplyError::Request(format!("the table is not that of the model's machine: {why}")));
+    let refused = |difference: String| {
+        let (one, other) = ("the table".to_string(), "the model's machine".to_string());
+        Err(IdentifyError::Unlike { one, relation: "that of", other, difference }.into())
+    };
     if table.convention != convention {
         return refused("its convention is another".into());
     }

@@ -66,10 +66,10 @@ pub fn workpiece_side(machine: &Machine, errors: &[f64], point_mm: [f64; 3]) -> 
 
 fn branch(machine: &Machine, errors: &[f64], axes: Vec<usize>, point_mm: [f64; 3]) -> Result<Branch, ApplyError> {
     if machine.rotation != Rotation::Exact {
-        return Err(ApplyError::Request(
-            "a description of the chain needs rotations: the machine has `rotation = \"small-angle\"`, whose matrices are \
-             none; identify the model with `rotation = \"exact\"`"
-                .into(),
+        return Err(ApplyError::unrepresentable(
+            "a description of the chain",
+            "`rotation = \"small-angle\"` of the machine",
+            "it needs rotations, and these matrices are none; identify the model with `rotation = \"exact\"`",
         ));
     }
     let mut before = Vector3::zeros();

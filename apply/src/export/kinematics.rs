@@ -143,11 +143,11 @@ pub fn table(
 ) -> Result<KinematicTable, ApplyError> {
     let control = format!("{name}, {}", kinematics.about);
     let (first, second) = tilting_table(&model.machine).ok_or_else(|| {
-        ApplyError::Request(format!(
-            "{control} describes two rotary axes under the workpiece, a tilting A (along X) or B (along Y) with C (along Z) on it; \
-             this machine is `{}`",
-            model.machine.code()
-        ))
+        ApplyError::unrepresentable(
+            &control,
+            format!("the machine `{}`", model.machine.code()),
+            "it describes two rotary axes under the workpiece, a tilting A (along X) or B (along Y) with C (along Z) on it",
+        )
     })?;
     let axes = [first, second];
     let letter = if model.machine.axes[first].direction[0].abs() == 1.0 { 'A' } else { 'B' };
@@ -168,9 +168,8 @@ pub fn table(
     let known = names.each_ref().map(|names| names.iter().filter_map(index).collect::<Vec<usize>>());
     let free = known.each_ref().map(|known| !known.is_empty());
     if !free.contains(&true) {
-        return Err(ApplyError::Request(format!(
-            "{control} has no entry for an error that the readings of the model determine"
-        )));
+        let holds = "it has no entry for an error that the readings of the model determine";
+        return Err(ApplyError::unrepresentable(control, "the model", holds));
     }
     let slots: Vec<usize> = names.iter().filter_map(|names| model.machine.error_slot(&names[0])).collect();
     let plain = known.each_ref().map(|known| known.iter().map(|k| model.parameters[*k].value).sum::<f64>());

@@ -3,10 +3,10 @@
 use abbe_model::driver::Driver;
 use abbe_model::session::limits::MAX_LENGTH_MM;
 use abbe_model::session::readings::Readings;
-use abbe_model::words::{cut, number};
 
 use crate::ApplyError;
 use crate::compare::workspace::AxisRange;
+use abbe_identify::IdentifyError;
 use abbe_identify::model_file::IdentifiedModel;
 
 /// Places along a rotary axis, odd.
@@ -40,24 +40,16 @@ impl Travel {
     /// If there is no such axis, or the range is none.
     pub fn with(mut self, model: &IdentifiedModel, name: &str, [from, to]: [f64; 2]) -> Result<Travel, ApplyError> {
         let axes = &model.machine.axes;
-        let refused = |why: String| {
-            let names: Vec<&str> = axes.iter().map(|axis| axis.name.as_str()).collect();
-            ApplyError::Request(format!(
-                "axis `{}`: {why}; the axes of the machine are {}",
-                cut(name, 80),
-                names.join(", ")
-            ))
-        };
-        let index = model.machine.axis_index(name).ok_or_else(|| refused("no such axis".into()))?;
-        if let Some(far) = [from, to].into_iter().find(|position| position.is_nan() || position.abs() > MAX_LENGTH_MM) {
-            let most = number(MAX_LENGTH_MM);
-            return Err(refused(format!(
-                "{}: a position in mm or degrees from -{most} to {most} is expected",
-                number(far)
-            )));
+        let no_axis = || IdentifyError::no_axis(&model.machine, "", name);
+        let index = model.machine.axis_index(name).ok_or_else(no_axis)?;
+        let range = [-MAX_LENGTH_MM, MAX_LENGTH_MM];
+        let axis = || format!("axis `{name}`");
+        if let Some(found) = [from, to].into_iter().find(|found| !(range[0]..=range[1]).contains(found)) {
+            return Err(IdentifyError::OutOfRange { name: axis(), found, range, unit: "mm or degrees" }.into());
         }
         if from >= to {
-            return Err(refused("the first number is not below the second".into()));
+            let found = "the first number is not below the second";
+            return Err(IdentifyError::not_applicable(axis(), found, "state the lower end first").into());
         }
         self.ranges[index] = [from, to].map(|value| axes[index].kind.to_internal(value));
         self.is_measured = false;

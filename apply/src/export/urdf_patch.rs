@@ -4,6 +4,7 @@
 //! `M_k = Π Trans(o_j)·E0_j·Trans(−o_j)` displaces the body that the joint moves. With the fixed joints `F` between them, the
 //! new origin is `F⁻¹·C_{k−1}⁻¹·C_k`. A prismatic joint is turned onto its tilted direction; the next joint turns back.
 
+use abbe_identify::IdentifyError;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_model::axis::AxisKind;
 use abbe_model::files::Source;
@@ -85,7 +86,10 @@ fn tilt(own: &JointFrame, kind: AxisKind, pose: &Isometry3<f64>, direction: &Vec
 /// Refuses a file whose chain is not the machine of the model.
 fn refuse_another(model: &IdentifiedModel, chain: &Chain) -> Result<(), ApplyError> {
     let machine = &model.machine;
-    let refused = |why: String| Err(ApplyError::Request(format!("the model is not of the robot in the file: {why}")));
+    let refused = |difference: String| {
+        let (one, other) = ("the model".to_string(), "the robot in the file".to_string());
+        Err(IdentifyError::Unlike { one, relation: "of", other, difference }.into())
+    };
     if machine.workpiece_side > 0 || machine.axes.len() != chain.joints.len() {
         return refused(format!(
             "its machine is `{}`, and the chain has {} joints",

@@ -2,12 +2,14 @@
 
 use std::sync::Arc;
 
+use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::Session;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Estimate, Estimator, Method};
 use crate::ApplyError;
+use abbe_identify::IdentifyError;
 use abbe_identify::fit::{self, Fit};
 use abbe_identify::noise::NoiseSource;
 use abbe_identify::parameters::Role;
@@ -106,10 +108,9 @@ pub struct Comparison {
 /// # Errors
 /// See [`Estimator::new`] and [`fit::prepare`].
 pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Comparison, ApplyError> {
-    if session.tests.iter().any(|test| test.station.bar().is_none()) {
-        return Err(ApplyError::Request(
-            "the methods of circles are those of ball bars, and a test has another instrument".into(),
-        ));
+    if let Some(other) = session.tests.iter().find(|test| test.station.bar().is_none()) {
+        let (found, expected) = (other.station.kind(), InstrumentKind::BallBar);
+        return Err(IdentifyError::OtherInstrument { method: "the methods of circles", found, expected }.into());
     }
     let (problem, full) = fit::prepare(session, seed)?;
     let estimator = Estimator::new(&problem, method)?;

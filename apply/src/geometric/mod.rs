@@ -23,6 +23,7 @@ pub use centre::{Centre, CircleGeometry};
 pub use compare::{CentreResult, Comparison, ComparisonRow, compare};
 
 use crate::ApplyError;
+use abbe_identify::IdentifyError;
 use abbe_identify::numerics::solve::Svd;
 use abbe_identify::numerics::tolerances::COLLINEAR;
 use abbe_identify::parameters::Role;
@@ -54,6 +55,8 @@ impl Method {
 
 /// Least height of a cone and least distance of two planes, mm.
 const MIN_LEVER_MM: f64 = 1.0;
+/// What the readings of a test need for a centre.
+const NEEDS: &str = "the method needs the readings of a circle";
 
 /// A method prepared for a session: its tests, its errors, and the linear map from centres to errors.
 #[derive(Clone, Debug)]
@@ -92,13 +95,15 @@ impl Estimator {
     /// If the session lacks tests for the method, or the errors are not identifiable from them.
     pub fn new(problem: &Problem, method: Method) -> Result<Estimator, ApplyError> {
         let machine = &problem.session.machine;
-        let refuse = |message: String| ApplyError::Request(format!("method {}: {message}", method.word()));
+        let refuse = |found: String, expected: &str| {
+            IdentifyError::not_applicable(format!("method {}", method.word()), found, expected).into()
+        };
         let mut circles = Vec::new();
         let mut refused = Vec::new();
         for (test, model) in problem.models.iter().enumerate() {
             match CircleGeometry::of(machine, model) {
                 Ok(geometry) => circles.push((test, geometry)),
-                Err(why) => refused.push(format!("test \"{}\": {why}", problem.tests[test].name)),
+                Err(why) => refused.push(format!("; test \"{}\": {why}", problem.tests[test].name)),
             }
         }
         let (tests, geometries): (Vec<usize>, Vec<CircleGeometry>) = chosen(method, circles).into_iter().unzip();
@@ -108,8 +113,7 @@ impl Estimator {
                 Method::Cone => "for each axis a test with the balls in one plane and one with the bar on a cone",
                 Method::TwoPlane => "for each axis two tests in planes apart from each other along the axis",
             };
-            let refused = if refused.is_empty() { String::new() } else { format!("; {}", refused.join("; ")) };
-            return Err(refuse(format!("the session lacks {wanted}{refused}")));
+            return Err(refuse(format!("no test fits{}", refused.concat()), &format!("the session needs {wanted}")));
         }
         let errors = errors(problem, method, &geometries);
         let sensitivities = sensitivities(problem, &tests, &geometries)?;
@@ -124,11 +128,9 @@ impl Estimator {
                 .filter(|k| (rank..errors.len()).any(|j| directions.right()[(*k, j)].abs() > 1e-3))
                 .map(|k| problem.parameters.list[errors[k]].id.as_str())
                 .collect();
-            return Err(refuse(format!(
-                "the centres of {} do not separate the errors {}",
-                counted(tests.len(), "test"),
-                confounded.join(", ")
-            )));
+            let (tests, errors) = (counted(tests.len(), "test"), confounded.join(", "));
+            let found = format!("the centres of {tests} do not separate the errors {errors}");
+            return Err(refuse(found, "the method needs tests that separate them"));
         }
         let inverse = directions.pseudo_inverse();
         let inverse = Mat::from_fn(errors.len(), sensitivities.nrows(), |k, i| {
@@ -144,10 +146,9 @@ impl Estimator {
     pub fn estimate(&self, problem: &Problem, observed: &[&[f64]]) -> Result<Estimate, ApplyError> {
         let mut centres = Vec::new();
         for (test, geometry) in self.tests.iter().zip(&self.geometries) {
-            let centre = geometry
-                .centre(observed[*test], &problem.rejected[*test])
-                .map_err(|why| ApplyError::Request(format!("test \"{}\": {why}", problem.tests[*test].name)))?;
-            centres.push(centre);
+            let name = &problem.tests[*test].name;
+            let refused = |why| IdentifyError::not_applicable(format!("test \"{name}\""), why, NEEDS);
+            centres.push(geometry.centre(observed[*test], &problem.rejected[*test]).map_err(refused)?);
         }
         let offsets: Vec<f64> = centres.iter().flat_map(|centre| centre.offset_mm).collect();
         let rows = offsets.len();
@@ -217,9 +218,9 @@ fn sensitivities(problem: &Problem, tests: &[usize], geometries: &[CircleGeometr
     let mut sensitivities = Mat::zeros(2 * tests.len(), parameters);
     for (k, (test, geometry)) in tests.iter().zip(geometries).enumerate() {
         let lengths = problem.models[*test].readings(&nominal[*test]);
-        let centre = geometry
-            .centre(&lengths, &problem.rejected[*test])
-            .map_err(|why| ApplyError::Request(format!("test \"{}\", nominally: {why}", problem.tests[*test].name)))?;
+        let name = &problem.tests[*test].name;
+        let refused = |why| IdentifyError::not_applicable(format!("test \"{name}\", nominally"), why, NEEDS);
+        let centre = geometry.centre(&lengths, &problem.rejected[*test]).map_err(refused)?;
         let block = RowBlock { test: *test, rows: 0..problem.models[*test].rows() };
         let rows = problem.rows(&nominal, &block)?;
         for (which, by_reading) in centre.by_reading.iter().enumerate() {

@@ -123,11 +123,13 @@ impl MachineWithErrors<'_> {
                 let error_mm = self.point(&commands, true, None) - self.point(positions, false, None);
                 Ok(Compensated { positions: commands, error_mm: error_mm.into() })
             }
-            Some((_, condition, _)) if condition.is_infinite() => Err(ApplyError::Request(format!(
-                "compensation: the {} linear axes of the machine do not span the space",
-                Aim::Position.axes(self.machine).len()
-            ))),
-            _ => Err(ApplyError::Request("compensation: no convergence; the errors are too large".to_string())),
+            Some((_, condition, _)) if condition.is_infinite() => {
+                let found = format!("{} linear axes of the machine", Aim::Position.axes(self.machine).len());
+                Err(IdentifyError::not_applicable("compensation", found, "they do not span the space").into())
+            }
+            _ => {
+                Err(IdentifyError::not_applicable("compensation", "no convergence", "the errors are too large").into())
+            }
         }
     }
 }
@@ -159,7 +161,9 @@ pub fn map(
 ) -> Result<(Vec<VolumetricPoint>, Summary), ApplyError> {
     let total = grid.iter().try_fold(1_usize, |total, axis| total.checked_mul(axis.len()));
     let Some(total) = total.filter(|total| *total > 0 && *total <= MAX_POINTS) else {
-        return Err(ApplyError::Request(format!("a map needs 1 to {MAX_POINTS} points")));
+        let found = grid.iter().map(|axis| axis.len() as f64).product();
+        let (name, range) = ("a map".to_string(), [1.0, MAX_POINTS as f64]);
+        return Err(IdentifyError::OutOfRange { name, found, range, unit: "points" }.into());
     };
     let points = parallel::map(total, &|number| {
         let mut rest = number;
@@ -170,11 +174,11 @@ pub fn map(
         }
         let mut point = machine_with_errors.error_at(&positions);
         if !point.error_mm.iter().all(|error| error.abs() <= LARGEST) {
-            return Err(ApplyError::Request(format!(
-                "the errors displace the tool by {:.2e} mm at {}; polynomials grow fast beyond their scale",
-                norm(point.error_mm),
-                machine_with_errors.position_text(&positions)
-            )));
+            let (error, place) = (norm(point.error_mm), machine_with_errors.position_text(&positions));
+            let found = format!("the errors displace the tool by {error:.2e} mm at {place}");
+            return Err(
+                IdentifyError::not_applicable("a map", found, "polynomials grow fast beyond their scale").into()
+            );
         }
         if compensate {
             point.compensated = Some(machine_with_errors.compensate(&positions)?);

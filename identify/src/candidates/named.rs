@@ -29,12 +29,8 @@ pub fn effect(problem: &Problem, id: &str) -> Result<Effect, IdentifyError> {
             candidates.iter().map(|c| c.effect.id()).filter(|other| other.starts_with(before_shape)).collect();
         alike.dedup();
         alike.truncate(6);
-        let hint = if alike.is_empty() {
-            "identifiers are component~driver:shape, as in EZC~C:h2".to_string()
-        } else {
-            format!("similar ones: {}", alike.join(", "))
-        };
-        return Err(IdentifyError::Request(format!("`{id}` is not in the library of effects for this plan; {hint}")));
+        let these = "identifiers are component~driver:shape, as in EZC~C:h2; similar ones:";
+        return Err(IdentifyError::unknown("the library of effects for this plan", "effect", id, these, alike));
     };
     Ok(candidate.effect.clone())
 }

@@ -31,12 +31,9 @@ pub fn assume(session: &Session, ids: &[String]) -> Result<Session, IdentifyErro
         let found = session.effects.iter().enumerate().find_map(|(k, effect)| Some((k, explained_by(effect, id)?)));
         let Some((k, effect)) = found else {
             let own = session.effects.iter().map(Effect::id);
-            let known: Vec<String> =
-                own.chain(session.effects.iter().flat_map(|effect| effect.aliases.iter().map(Effect::id))).collect();
-            let known = if known.is_empty() { "none".to_string() } else { known.join(", ") };
-            return Err(IdentifyError::Request(format!(
-                "no effect of the session is explained by \"{id}\"; the explanations are: {known}"
-            )));
+            let known = own.chain(session.effects.iter().flat_map(|effect| effect.aliases.iter().map(Effect::id)));
+            let (what, these) = ("effect that is explained by", "the explanations are:");
+            return Err(IdentifyError::unknown("the session", what, id, these, known));
         };
         session.effects[k] = effect;
     }

@@ -104,10 +104,8 @@ pub fn base_parameters(problem: &Problem, fit: &Fit, gauge: Gauge) -> Result<Bas
     let exact = at_solution.right().subcols(exact_rank, list.len() - exact_rank).to_owned();
     let (combinations, mut held) = echelon(exact.as_ref(), &preference, MIN_PIVOT);
     if held.len() < exact.ncols() {
-        return Err(IdentifyError::Request(
-            "the null space of these readings has no stable base parametrisation; add tests or remove parameters"
-                .into(),
-        ));
+        let found = "the null space of these readings has none that is stable";
+        return Err(IdentifyError::not_applicable("base parametrisation", found, "add tests or remove parameters"));
     }
     // First order: along the null space until the held parameters are at nominal.
     let mut beta = fit.beta.clone();

@@ -18,7 +18,7 @@
 //! The column of a parameter is its sensitivity at the nominal machine. A parameter is a term if the two columns are
 //! proportional, whatever the directions of the axes are.
 
-use abbe_model::instrument::Instrument;
+use abbe_model::instrument::{Instrument, InstrumentKind};
 use faer::Mat;
 
 use super::Fit;
@@ -41,10 +41,8 @@ const SEPARABLE: f64 = 1e-6;
 pub fn report(problem: &Problem, fit: &Fit) -> Result<PointingTerms, IdentifyError> {
     let names = |test: usize| problem.models[test].channels().iter().map(|channel| channel.name);
     if let Some(other) = (0..problem.tests.len()).find(|test| !names(*test).eq(["across", "up"])) {
-        let kind = problem.tests[other].station.kind().word();
-        let message =
-            format!("terms of TPOINT are those of a mount: a test has the instrument `{kind}`, not `pointing`");
-        return Err(IdentifyError::Request(message));
+        let (found, expected) = (problem.tests[other].station.kind(), InstrumentKind::Pointing);
+        return Err(IdentifyError::OtherInstrument { method: "terms of TPOINT", found, expected });
     }
     let (directions, columns) = columns(problem)?;
     let terms = of_parameters(&directions, &columns);

@@ -19,9 +19,7 @@ impl IdentifiedModel {
     /// If no parameter is identifiable, or the fit of the location errors alone does not converge.
     pub fn of_fit(problem: &Problem, fit: &Fit, provenance: Provenance) -> Result<IdentifiedModel, IdentifyError> {
         if fit.rank.identifiable_basis.ncols() == 0 {
-            return Err(IdentifyError::Request(
-                "no parameter is identifiable from these readings, so there is no model to save".into(),
-            ));
+            return Err(IdentifyError::NothingIdentifiable { lacking: "no model to save" });
         }
         let base = base_parameters(problem, fit, Gauge::OwnDirection)?;
         let list = &problem.parameters.list;

@@ -24,12 +24,12 @@ impl IdentifiedModel {
     /// # Errors
     /// If a number of the model is not finite.
     pub fn to_text(&self) -> Result<String, IdentifyError> {
-        let fault = |cause: String| IdentifyError::Request(format!("the model cannot be written as JSON: {cause}"));
+        let fault = |cause: serde_json::Error| IdentifyError::Write { what: "the model", cause: cause.into() };
         let finite = self.covariance.is_all_finite() && self.parameters.iter().all(|p| p.value.is_finite());
         if !finite {
-            return Err(fault("a value or an uncertainty is not finite".into()));
+            return Err(fault(serde::ser::Error::custom("a value or an uncertainty is not finite")));
         }
-        let mut value = serde_json::to_value(self.document()).map_err(|cause| fault(cause.to_string()))?;
+        let mut value = serde_json::to_value(self.document()).map_err(fault)?;
         let sum = checksum(&value);
         value[CHECKSUM] = Value::String(sum);
         let mut text = String::new();

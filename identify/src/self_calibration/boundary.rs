@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use faer::Mat;
 
-use super::equations::{Equations, Function};
+use super::equations::{Equations, Function, refused};
 use crate::error::IdentifyError;
 use crate::numerics::rank::Rank;
 use crate::numerics::triangle::Triangle;
@@ -34,10 +34,10 @@ pub fn conditions(equations: &Equations, axis: &str) -> Result<Vec<Condition>, I
     let mut conditions = Vec::new();
     for function in Function::ALL {
         let Some(column) = equations.column(function, 0.0) else {
-            return Err(IdentifyError::Request(format!(
-                "self-calibration: no reading determines {} at 0°; add a reading there, because every function is referred to its value at 0°",
-                name(function)
-            )));
+            return Err(refused(
+                format!("no reading determines {} at 0°", name(function)),
+                "add a reading there, because every function is referred to its value at 0°",
+            ));
         };
         conditions.push(Condition { words: format!("{}(0°) = 0", name(function)), terms: vec![(column, 1.0)] });
     }

@@ -6,11 +6,15 @@ use std::sync::Arc;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{BodyErrors, ERRORS_PER_AXIS};
 use abbe_model::frames::Point;
+use abbe_model::instrument::InstrumentKind;
 use abbe_model::instrument::probe::{FORM, Probe, RADIUS};
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::{Prior, Session, Test};
 
 use crate::error::IdentifyError;
+
+/// The method in its errors.
+const METHOD: &str = "self-calibration";
 
 /// Angles nearer than this are equal, rad: positions in files are rounded to about 0.1 µm.
 const ANGLE_TOLERANCE: f64 = 1e-4;
@@ -116,26 +120,24 @@ impl Equations {
     /// artefact, another rotary axis that is not at zero, several artefacts or set-ups, a probing direction that is not
     /// radial, no readings.
     pub fn of(session: &Session) -> Result<Equations, IdentifyError> {
-        let refuse = |message: String| IdentifyError::Request(format!("self-calibration: {message}"));
         if let Some(other) = session.tests.iter().find(|test| test.station.probe().is_none()) {
-            return Err(refuse(format!(
-                "the session's instrument is a {}; the method takes a probe",
-                other.station.kind().word()
-            )));
+            let (found, expected) = (other.station.kind(), InstrumentKind::Probe);
+            return Err(IdentifyError::OtherInstrument { method: METHOD, found, expected });
         }
         let tests: Vec<Test> = session.tests.iter().filter(|test| test.readings.is_some()).cloned().collect();
         let Some(first) = tests.first() else {
             return Err(IdentifyError::NoReadings);
         };
         if let Some(other) = tests.iter().find(|test| test.setup != first.setup) {
-            return Err(refuse(format!(
-                "tests \"{}\" and \"{}\" have different set-ups; all tests must probe one artefact in one clamping: give them the same `setup`",
-                first.name, other.name
-            )));
+            return Err(refused(
+                format!("tests \"{}\" and \"{}\" have different set-ups", first.name, other.name),
+                "all tests must probe one artefact in one clamping: give them the same `setup`",
+            ));
         }
-        let axis = turning_axis(session, &tests).map_err(refuse)?;
+        let axis = turning_axis(session, &tests)?;
         let Some((coordinate, sense)) = session.machine.axes[axis].principal() else {
-            return Err(refuse(format!("axis `{}` does not lie along X, Y or Z", session.machine.axes[axis].name)));
+            let name = &session.machine.axes[axis].name;
+            return Err(refused(format!("axis `{name}` turns"), "the method is for an axis along X, Y or Z"));
         };
         let along = coordinate.index();
         let mut equations = Equations {
@@ -152,7 +154,7 @@ impl Equations {
         };
         let mut touches = Vec::new();
         for test in &tests {
-            touches.extend(equations.touches(session, test).map_err(refuse)?);
+            touches.extend(equations.touches(session, test)?);
         }
         for touch in &touches {
             for (known, angle) in equations.angles.iter_mut().zip(touch.angles) {
@@ -169,10 +171,9 @@ impl Equations {
                 touch.angles.iter().all(|angle| angular_distance(*angle, 0.0) < ANGLE_TOLERANCE)
             };
             let Some(first) = touches.iter().find(at_zero).map(|touch| touch.outward_mm) else {
-                return Err(refuse(
-                    "no reading at 0° of axis, machine and artefact as reference; \
-                     `radius_u_um = inf` makes the radius a parameter instead"
-                        .into(),
+                return Err(refused(
+                    "no reading at 0° of axis, machine and artefact as reference",
+                    "`radius_u_um = inf` makes the radius a parameter instead",
                 ));
             };
             for touch in &mut touches {
@@ -193,7 +194,7 @@ impl Equations {
     }
 
     /// The probed points of a test, one per reading.
-    fn touches(&self, session: &Session, test: &Test) -> Result<Vec<TouchEquation>, String> {
+    fn touches(&self, session: &Session, test: &Test) -> Result<Vec<TouchEquation>, IdentifyError> {
         let (Some(probe), Some(readings)) = (test.station.probe(), &test.readings) else {
             return Ok(Vec::new());
         };
@@ -216,12 +217,11 @@ impl Equations {
             .map(|row| {
                 let angles = &touched[row];
                 if angles.direction_error > DIRECTION_TOLERANCE {
-                    return Err(format!(
-                        "test \"{}\", reading {}: the probe does not move straight towards axis `{}`; the method requires radial probing",
-                        test.name,
-                        row + 1,
-                        machine.axes[self.axis].name
-                    ));
+                    let (name, number, axis) = (&test.name, row + 1, &machine.axes[self.axis].name);
+                    let found = format!(
+                        "test \"{name}\", reading {number}: the probe does not move straight towards axis `{axis}`"
+                    );
+                    return Err(refused(found, "the method requires radial probing"));
                 }
                 // The measured radius increases as the distance decreases.
                 let by = |slot: usize| -sensitivities.derivatives[slot][row];
@@ -279,8 +279,13 @@ struct TouchAngles {
     direction_error: f64,
 }
 
+/// The error of a session that does not fit the method.
+pub(super) fn refused(found: impl Into<String>, expected: impl Into<String>) -> IdentifyError {
+    IdentifyError::not_applicable(METHOD, found, expected)
+}
+
 /// The rotary axis that turns under the artefact.
-fn turning_axis(session: &Session, tests: &[Test]) -> Result<usize, String> {
+fn turning_axis(session: &Session, tests: &[Test]) -> Result<usize, IdentifyError> {
     let machine = &session.machine;
     let moves = |axis: usize| {
         tests.iter().filter_map(|test| test.readings.as_ref()).any(|readings| {
@@ -292,23 +297,22 @@ fn turning_axis(session: &Session, tests: &[Test]) -> Result<usize, String> {
     let turning: Vec<usize> = (0..machine.axes.len()).filter(rotary).filter(|axis| moves(*axis)).collect();
     let [axis] = turning[..] else {
         let names: Vec<&str> = turning.iter().map(|axis| machine.axes[*axis].name.as_str()).collect();
-        return Err(match names.len() {
+        let found = match names.len() {
             0 => "no rotary axis turns in these tests".into(),
-            _ => format!("axes {} turn; the method is for one", names.join(" and ")),
-        });
+            _ => format!("axes {} turn", names.join(" and ")),
+        };
+        return Err(refused(found, "the method is for one"));
     };
     if axis >= machine.workpiece_side {
-        return Err(format!(
-            "axis `{}` turns the tool; the method is for an axis that turns the table",
-            machine.axes[axis].name
-        ));
+        let found = format!("axis `{}` turns the tool", machine.axes[axis].name);
+        return Err(refused(found, "the method is for an axis that turns the table"));
     }
     for other in (0..machine.axes.len()).filter(rotary).filter(|other| *other != axis) {
         let readings = tests.iter().filter_map(|test| test.readings.as_ref());
         if readings.flat_map(|readings| &readings.positions[other]).any(|q| q.abs() > ANGLE_TOLERANCE) {
-            return Err(format!(
-                "axis `{}` does not stand at zero; the directions across axis `{}` are then not those of R",
-                machine.axes[other].name, machine.axes[axis].name
+            return Err(refused(
+                format!("axis `{}` does not stand at zero", machine.axes[other].name),
+                format!("the directions across axis `{}` are then not those of R", machine.axes[axis].name),
             ));
         }
     }

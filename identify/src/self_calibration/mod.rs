@@ -74,10 +74,9 @@ pub fn calibrate(session: &Session) -> Result<Calibration, IdentifyError> {
     let (sigma_mm, u_enlargement) = match stated {
         Some(sigma) => (sigma, crate::fit::u_enlargement(square / sigma.powi(2), freedom)),
         None if unreferenced.freedom == 0 => {
-            return Err(IdentifyError::Request(
-                "self-calibration: the session states no `noise_um`, and there are no more readings than parameters to estimate it from; \
-                 state it, or repeat the cycle"
-                    .into(),
+            return Err(equations::refused(
+                "the session states no `noise_um`, and there are no more readings than parameters to estimate it from",
+                "state it, or repeat the cycle",
             ));
         }
         None => {

@@ -88,11 +88,9 @@ impl<'m> KnownErrors<'m> {
         {
             let errors =
                 carried.iter().map(|j| &model.parameters[*j]).filter(|parameter| parameter.role == Role::Error);
-            let known: Vec<&str> = errors.map(|parameter| parameter.id.as_str()).collect();
-            return Err(IdentifyError::Request(format!(
-                "\"{name}\" is to be estimated anew, but the model does not hold it; it holds {}",
-                if known.is_empty() { "no location errors".to_string() } else { known.join(", ") }
-            )));
+            let (what, these) = ("error to estimate anew", "its location errors are:");
+            let known = errors.map(|parameter| &parameter.id);
+            return Err(IdentifyError::unknown("the model", what, name.to_string(), these, known));
         }
         let (noise, noise_source) = first_noise(model, session)?;
         let mut full = Problem::new(&model.session(session), noise.clone(), 1)?;
@@ -124,10 +122,10 @@ impl<'m> KnownErrors<'m> {
         full.linearise_numbers(&mut beta)?;
         let depends = |test: usize| full.own_parameters(test).iter().any(|j| columns.contains(j));
         if columns.is_empty() || !(0..full.tests.len()).any(depends) {
-            return Err(IdentifyError::Request(
-                "no reading of the session depends on an error that the model holds: model and session have nothing in \
-                 common; fit a model of the axes that the session moves"
-                    .into(),
+            return Err(IdentifyError::not_applicable(
+                "no reading of the session depends on an error that the model holds",
+                "model and session have nothing in common",
+                "fit a model of the axes that the session moves",
             ));
         }
         let left_out = model.effects.iter().filter(|effect| !IdentifiedModel::is_carried(effect));
@@ -358,11 +356,11 @@ fn first_noise(model: &IdentifiedModel, session: &Session) -> Result<(Noise, Noi
     }
     let unit = ReadingUnit::of(session);
     if model.reading_unit != unit {
-        return Err(IdentifyError::Request(format!(
-            "the session states no noise, and that of the model is in {}: state `{}` in [instrument]",
-            model.reading_unit.symbol(),
-            unit.noise_key()
-        )));
+        return Err(IdentifyError::Missing {
+            of: "the session".to_string(),
+            what: format!("noise, and that of the model is in {}", model.reading_unit.symbol()),
+            remedy: format!("state `{}` in [instrument]", unit.noise_key()),
+        });
     }
     let noise = match model.noise.source {
         // A residual contains what the model lacks; on readings that it has not seen, that is the held-out error.

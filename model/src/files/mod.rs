@@ -17,7 +17,7 @@ pub(crate) mod quantity;
 pub mod read;
 pub mod robot;
 pub mod source_map;
-pub(crate) mod spelling;
+pub mod spelling;
 pub mod stamp;
 pub(crate) mod stl;
 pub mod store;

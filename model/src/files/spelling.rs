@@ -13,7 +13,7 @@ pub(crate) fn known_names(found: &str, known: &[&str]) -> String {
 }
 
 /// The start of a help text: a suggestion of the most similar known name, or nothing.
-pub(crate) fn suggestion(found: &str, known: &[impl AsRef<str>]) -> String {
+pub fn suggestion(found: &str, known: &[impl AsRef<str>]) -> String {
     most_similar(found, known).map_or(String::new(), |near| format!("did you mean `{near}`? "))
 }
 

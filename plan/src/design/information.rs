@@ -10,6 +10,7 @@ use abbe_model::session::Prior;
 use faer::{Mat, MatRef};
 
 use crate::PlanError;
+use abbe_identify::IdentifyError;
 use abbe_identify::linear::Linearisation;
 use abbe_identify::numerics::reduction::inverse_of_upper;
 use abbe_identify::numerics::triangle::upper;
@@ -63,12 +64,10 @@ impl SharedParameters {
         let list = &problem.parameters.list;
         let index: HashMap<&str, usize> =
             list.iter().enumerate().map(|(j, parameter)| (parameter.id.as_str(), j)).collect();
-        let columns = self
-            .ids
-            .iter()
-            .map(|id| index.get(id.as_str()).copied())
-            .collect::<Option<Vec<usize>>>()
-            .ok_or_else(|| PlanError::Request("a parameter does not belong to this plan".to_string()))?;
+        let known = || list.iter().map(|parameter| &parameter.id);
+        let unknown = |id: &String| IdentifyError::unknown("the plan", "parameter", id, "its parameters are", known());
+        let columns = self.ids.iter().map(|id| index.get(id.as_str()).copied().ok_or_else(|| unknown(id)));
+        let columns = columns.collect::<Result<Vec<usize>, _>>()?;
         Ok(self.regularised(linear.marginal(&columns)?.as_ref(), 1.0))
     }
 

@@ -30,6 +30,7 @@ use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::PlanError;
+use abbe_identify::IdentifyError;
 use abbe_identify::candidates::columns::Columns;
 use abbe_identify::candidates::library;
 use abbe_identify::linear::{Linearisation, is_of_interest, prior_u};
@@ -157,17 +158,18 @@ struct Plan<'p> {
 /// inputs, or if a fit does not converge because an input is too large.
 pub fn global(problem: &Problem, options: &GlobalOptions) -> Result<GlobalAnalysis, PlanError> {
     if options.samples < 8 {
-        return Err(PlanError::Request(format!("{} samples: at least 8 are expected", options.samples)));
+        let (purpose, found) = ("the global analysis", options.samples);
+        return Err(IdentifyError::TooFew { purpose, what: "samples", least: 8, found }.into());
     }
     let plan = Plan::new(problem, options)?;
     let (fits, estimates) = (options.samples * (plan.inputs.len() + 2), plan.errors.len());
     if fits.saturating_mul(estimates) > MAX_ESTIMATES {
-        return Err(PlanError::Request(format!(
-            "{} samples of {} inputs are {fits} fits of {estimates} errors; the limit is {MAX_ESTIMATES} estimates: state \
-             fewer samples",
-            options.samples,
-            plan.inputs.len()
-        )));
+        let (samples, inputs) = (options.samples, plan.inputs.len());
+        return Err(PlanError::TooMany {
+            found: format!("{samples} samples of {inputs} inputs are {fits} fits, each of {estimates} errors"),
+            limit: MAX_ESTIMATES,
+            remedy: "state fewer samples".to_string(),
+        });
     }
     let design = Design::evaluate(plan.inputs.len(), options.samples, options.seed, &|point| plan.estimate(point))?;
     let shares = plan.linear_variances()?;
@@ -230,9 +232,10 @@ impl<'p> Plan<'p> {
         let candidates = library::candidates(problem)?;
         for (given, _) in options.vary.iter().zip(&used).filter(|(_, used)| !**used) {
             let Some(candidate) = candidates.iter().find(|candidate| candidate.effect.id() == given.id) else {
-                let message = "is neither a set-up parameter with an uncertainty nor an effect of the library for this \
-                               plan; identifiers are as in `bar[A100]` and `EZC~C:h2`";
-                return Err(PlanError::Request(format!("`{}` {message}", given.id)));
+                let uncertain = list.iter().filter(|p| p.role == Role::Setup && prior_u(p).is_some());
+                let what = "set-up parameter with an uncertainty and no effect of the library called";
+                let these = "identifiers are as in `bar[A100]` and `EZC~C:h2`; the set-up parameters are:";
+                return Err(IdentifyError::unknown("the plan", what, &given.id, these, uncertain.map(|p| &p.id)).into());
             };
             let first = truth.parameters.list.len();
             truth.add_effect(&candidate.effect)?;
@@ -311,9 +314,8 @@ impl<'p> Plan<'p> {
                 break;
             }
         }
-        Err(PlanError::Request(
-            "a fit of the global analysis does not converge: an input is too large; reduce its size".into(),
-        ))
+        let found = "a fit does not converge";
+        Err(IdentifyError::not_applicable("global analysis", found, "an input is too large: reduce its size").into())
     }
 
     /// Variance of each error by each input in linear propagation, internal units.

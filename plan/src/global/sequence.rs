@@ -17,11 +17,11 @@ const NUMBERS: &str = include_str!("direction-numbers.txt");
 /// If there are more than [`MAX_DIMENSIONS`].
 pub fn points(dimensions: usize, count: usize, shift: &[u32]) -> Result<Vec<Vec<f64>>, PlanError> {
     if dimensions > MAX_DIMENSIONS {
-        return Err(PlanError::Request(format!(
-            "{} varied inputs: the Sobol' sequence of this program has {MAX_DIMENSIONS} dimensions, two for each input; \
-             state fewer priors, or analyse fewer tests",
-            dimensions / 2
-        )));
+        return Err(PlanError::TooMany {
+            found: format!("{} varied inputs need {dimensions} dimensions of the Sobol' sequence", dimensions / 2),
+            limit: MAX_DIMENSIONS,
+            remedy: "state fewer priors, or analyse fewer tests".to_string(),
+        });
     }
     let lines: Vec<&str> = NUMBERS.lines().filter(|line| !line.starts_with('#')).collect();
     let directions: Vec<[u32; BITS]> =

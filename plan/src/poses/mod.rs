@@ -132,14 +132,13 @@ pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Resu
     if let Some(test) = without_place(session, tests).first() {
         return Err(PlanError::NoPlace { test: test.name.clone() });
     }
+    let asked = counted(options.poses, "chosen pose");
     let Found { tests, candidates, excluded, warnings } = candidates(session, tests, options)?;
     if candidates.len() < options.poses {
-        return Err(PlanError::Request(format!(
-            "{} of {} drawn poses are within the limits, and {} are asked for; widen the limits or draw more candidates",
-            candidates.len(),
-            candidates.len() + excluded,
-            options.poses
-        )));
+        let (left, drawn) = (candidates.len(), candidates.len() + excluded);
+        let found = format!("{left} of {drawn} drawn poses are within the limits");
+        let expected = "widen the limits or draw more candidates";
+        return Err(IdentifyError::not_applicable(asked, found, expected).into());
     }
     let problem = problem(session, &tests, &candidates, noise(session, options))?;
     let list = &problem.parameters.list;
@@ -169,12 +168,11 @@ pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Resu
     let [rank_of_chosen, involved] = ranked.rank(&chosen)?;
     if rank_of_chosen < involved {
         let lacking = involved - rank_of_chosen;
-        return Err(PlanError::Request(format!(
-            "the readings of {} have rank {rank_of_chosen} in {}; ask for at least {} poses",
-            counted(options.poses, "pose"),
-            counted(involved, "unknown"),
-            options.poses + lacking.div_ceil(problem.channels(0))
-        )));
+        let unknowns = counted(involved, "unknown");
+        let found =
+            format!("the readings of {} have rank {rank_of_chosen} in {unknowns}", counted(options.poses, "pose"));
+        let least = options.poses + lacking.div_ceil(problem.channels(0));
+        return Err(IdentifyError::not_applicable(asked, found, format!("ask for at least {least} poses")).into());
     }
     let mut random = Pcg64::new(u128::from(options.seed), RANDOM_SET_STREAM);
     let value = |poses: &[usize]| options.goal.value(&shared, &design.with(poses));

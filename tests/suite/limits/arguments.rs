@@ -22,7 +22,7 @@ fn arguments_at_their_limits() {
         ("plan", &["--setup-um", "1e300"], "a number of µm from 1e-6 to 1e12 is expected"),
         ("simulate", &["--noise-um", "1e300"], "a standard deviation in µm is expected: 0, or 1e-6 to 1e12"),
         ("simulate", &["--noise-um", "1e-300"], "a standard deviation in µm is expected: 0, or 1e-6 to 1e12"),
-        ("simulate", &["--error", "EX0C=1e300um"], "1e300 is too large; the maximum is 1e12"),
+        ("simulate", &["--error", "EX0C=1e300um"], "1e300 is too large; the limit is 1e12"),
         ("simulate", &["--error", "EX0C=1e10um"], "`EX0C=1e10um`: 1e10 um is too large; the limit is 1 km"),
         (
             "plan",

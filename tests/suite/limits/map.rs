@@ -65,7 +65,7 @@ fn arguments_of_a_map() {
         (["--axis", "A=nan"], "write where the axis stands"),
         (["--tool-mm", "1e300,0,0"], "`--tool-mm 1e300`: a length from -1000000 to 1000000 mm is expected"),
         (["--tool-mm", "0,0,-1e9"], "`--tool-mm -1e9`: a length from -1000000 to 1000000 mm is expected"),
-        (["--places", "100"], "a map needs 1 to 1000000 points"),
+        (["--places", "100"], "is not in the range from 1 to 1000000 points"),
     ] {
         let stderr = message_of(&folder, &ready, &more);
         assert!(stderr.contains(message), "{stderr}");
@@ -100,7 +100,10 @@ fn invalid_files_of_errors() {
         }
     }
     let stderr = refused(&long);
-    assert!(stderr.contains("`EX0C`: the number with its unit has 300000 bytes; the maximum is 100"), "{stderr}");
+    assert!(
+        stderr.contains("`EX0C`: a number with its unit of 300000 bytes is too large; the limit is 100 bytes"),
+        "{stderr}"
+    );
 }
 
 /// A byte order mark and CRLF line ends have no effect.

@@ -60,7 +60,7 @@ fn what_a_new_mounting_changes_is_estimated_anew() {
 fn an_error_that_the_model_lacks_is_refused() {
     let (_folder, session) = night([0.0; 6]);
     let fault = validate_anew(&model(&session), &session, &names(&["EC0AZ", "EX0EL"])).err().unwrap().to_string();
-    assert!(fault.contains("\"EX0EL\"") && fault.contains("EC0AZ, EA0EL"), "{fault}");
+    assert!(fault.contains("`EX0EL`") && fault.contains("EC0AZ, EA0EL"), "{fault}");
 }
 
 /// NPAE, TF and TX of the MMT of 2021 do not hold in 2023. An independent least squares leaves 4.7″ and more with them, and

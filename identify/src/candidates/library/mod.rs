@@ -83,13 +83,13 @@ pub struct LibraryEffect {
 /// # Errors
 /// Only if the compiled library cannot be read.
 pub fn families() -> Result<Vec<Family>, IdentifyError> {
-    let library: Library = toml::from_str(LIBRARY)
-        .map_err(|fault| IdentifyError::Request(format!("the library of effects cannot be read: {fault}")))?;
+    let damaged = |cause| IdentifyError::Library(Box::new(cause));
+    let library: Library = toml::from_str(LIBRARY).map_err(damaged)?;
     for family in &library.family {
         let is_named = matches!(Driver::parse(&family.driver), Driver::Axis(_));
         if is_named && !NAMED_DRIVERS.contains(&family.driver.as_str()) || !shapes::is_known(&family.shape) {
-            let fault = format!("the library of effects has an unknown driver or shape in \"{}\"", family.name);
-            return Err(IdentifyError::Request(fault));
+            let fault = format!("unknown driver or shape in \"{}\"", family.name);
+            return Err(damaged(serde::de::Error::custom(fault)));
         }
     }
     Ok(library.family)
