@@ -43,7 +43,7 @@ pub fn mutant(number: usize) -> bool {
 """
 
 # Tests of the workspace or of the operating system, not of the computations of the crates.
-EXCLUDED_TESTS = ("supply_chain", "early_returns", "kill::", "another_build", "report_browser", "repeatability", "codes::")
+EXCLUDED_TESTS = ("supply_chain", "early_returns", "kill::", "another_build", "report::browser", "repeatability", "codes::")
 KEPT = "::kept::"
 PROFILE = ["--profile", "checked"]
 

@@ -3,7 +3,7 @@
     pip install --no-deps figaroh==1.0.2
     python python/benches/poses.py
 
-30 poses of the UR10 out of 1,000 in the box of `suite::poses`, a tracker with 50 µm. Both sets are judged by the Jacobian
+30 poses of the UR10 out of 1,000 in the box of `suite::plan::poses`, a tracker with 50 µm. Both sets are judged by the Jacobian
 of :meth:`abbe.Session.jacobian` for the errors that the command estimates.
 """
 

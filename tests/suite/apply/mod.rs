@@ -1,0 +1,7 @@
+//! Models compared, exported and compensated.
+
+pub mod compare_figures;
+pub mod compensation;
+pub mod history_figures;
+pub mod model_commands;
+pub mod volumetric;

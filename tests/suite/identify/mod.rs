@@ -1,0 +1,33 @@
+//! Fit, trace and validation: estimates, uncertainties and verdicts against independent data.
+
+pub mod channels;
+pub mod circular;
+pub mod claims;
+pub mod closed_loop;
+pub mod conformity;
+pub mod conformity_set_up;
+pub mod conformity_shares;
+pub mod doors;
+pub mod geometric;
+pub mod left_out_test;
+pub mod measured;
+pub mod nist;
+pub mod one_answer;
+pub mod patterns;
+pub mod plausibility;
+pub mod pointing;
+pub mod propagation;
+pub mod recovery;
+pub mod repeated;
+pub mod robots;
+pub mod rtest;
+pub mod rtest_command;
+pub mod rtest_findings;
+pub mod self_calibration;
+pub mod simulate;
+pub mod statements;
+pub mod targets;
+pub mod trace;
+pub mod trace_reported;
+pub mod tracker_blunders;
+pub mod validate_command;

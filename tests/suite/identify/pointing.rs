@@ -1,0 +1,183 @@
+//! Pointing observations: the reading against rotation matrices, the stars of two telescopes against the fits of TPOINT.
+
+mod anew;
+mod hysteresis;
+mod panels;
+mod precession;
+
+use std::fs;
+use std::path::Path;
+
+use abbe::identify::fit::{prepare, tpoint};
+use abbe::identify::results::{PointingTerm, PointingTerms};
+use abbe::model::component::ErrorName;
+use abbe::model::files::{self, ReadOptions};
+use abbe::model::session::Session;
+use nalgebra::{Rotation3, Unit, Vector3};
+use test_needs::data;
+
+use crate::suite::ready;
+
+/// A ready session of a telescope, with the folder of its data.
+fn telescope(name: &str, folder: &Path, edit: impl Fn(String) -> String) -> Session {
+    let own = tempfile::tempdir().unwrap();
+    fs::copy(ready("telescope/machine.toml"), own.path().join("machine.toml")).unwrap();
+    let text = fs::read_to_string(ready(&format!("telescope/{name}"))).unwrap();
+    let file = own.path().join(name);
+    fs::write(&file, edit(text)).unwrap();
+    let options = ReadOptions { data_directory: Some(folder.to_path_buf()), ..ReadOptions::default() };
+    files::session(&file, &options).unwrap()
+}
+
+fn terms(session: &Session) -> PointingTerms {
+    let (problem, fit) = prepare(session, 1).unwrap();
+    tpoint::report(&problem, &fit).unwrap()
+}
+
+/// A fit of TPOINT: the sky rms, and each fitted term with value and sigma, arcsec.
+fn printed(file: &Path) -> (f64, Vec<(String, f64, f64)>) {
+    let text = fs::read_to_string(file).unwrap();
+    let number = |word: &str| word.parse::<f64>().unwrap();
+    let head: Vec<&str> = text.lines().nth(1).unwrap().split_whitespace().collect();
+    let of_line = |line: &str| {
+        let words: Vec<&str> = line.trim_start_matches(['&', ' ']).split_whitespace().collect();
+        let [term, value, sigma] = words[..] else { return None };
+        Some((term.to_string(), number(value), number(sigma)))
+    };
+    (number(head[2]), text.lines().skip(2).filter_map(of_line).collect())
+}
+
+fn term<'t>(found: &'t PointingTerms, name: &str) -> &'t PointingTerm {
+    found.terms.iter().find(|term| term.term == name).unwrap_or_else(|| panic!("{name} in {found:?}"))
+}
+
+/// The six terms that TPOINT printed for these stars, with its sigma.
+#[test]
+fn auxtel_has_the_terms_that_tpoint_printed() {
+    let name = "auxtel_has_the_terms_that_tpoint_printed";
+    let Some(folder) = data(name, "telescopes/auxtel") else {
+        return;
+    };
+    let found = terms(&telescope("auxtel.toml", &folder, |text| text));
+    let model = folder.join("at_20220406_ia_ie_an_aw_tx10_ca.mod");
+    let (sky_rms, printed) = printed(&model);
+    assert_eq!((found.stars, printed.len(), found.terms.len()), (54, 6, 6));
+    assert!(found.without_term.is_empty());
+    for (name, value, sigma) in printed {
+        // TX10 is the column of TX.
+        let own = term(&found, name.trim_end_matches("10"));
+        let [difference, ratio] = [own.value_arcsec.unwrap() - value, own.sigma_arcsec.unwrap() / sigma];
+        println!("{name}: {difference:+.3}\u{2033} from {value}, sigma {ratio:.4} of {sigma}");
+        assert!(difference.abs() < 0.05, "{name}: {difference}");
+        assert!((ratio - 1.0).abs() < 0.02, "{name}: {ratio}");
+    }
+    println!("sky rms {} of {sky_rms}, population sd {:?}", found.sky_rms_arcsec, found.population_sd_arcsec);
+    assert!((found.sky_rms_arcsec - sky_rms).abs() < 0.005);
+    assert!((found.population_sd_arcsec.unwrap() - 3.33).abs() < 0.005);
+}
+
+/// Eight terms on the stars of two nights, against least squares in the small-angle design.
+#[test]
+fn mmt_has_the_sky_rms_of_eight_terms() {
+    let name = "mmt_has_the_sky_rms_of_eight_terms";
+    let Some(folder) = data(name, "telescopes/mmt") else {
+        return;
+    };
+    for (file, stars, sky_rms) in [("point_20210821.dat", 80, 0.93), ("point_20230702.dat", 86, 1.36)] {
+        let edit = |text: String| text.replace("point_20210821.dat", file);
+        let found = terms(&telescope("mmt.toml", &folder, edit));
+        println!("{file}: {found:#?}");
+        assert_eq!((found.stars, found.terms.len()), (stars, 8), "{file}");
+        assert!((found.sky_rms_arcsec - sky_rms).abs() < 0.005, "{file}: {}", found.sky_rms_arcsec);
+    }
+}
+
+/// A mount with stars of known readings: the session of a table of positions of both axes and true directions, degrees.
+fn simulated(folder: &Path, stars: &[[f64; 4]], rest: &str) -> Session {
+    fs::copy(ready("telescope/machine.toml"), folder.join("machine.toml")).unwrap();
+    let mut csv = "az_deg,el_deg,true_azimuth_deg,true_elevation_deg\n".to_string();
+    for star in stars {
+        csv.push_str(&(star.map(|x| format!("{x:.15}")).join(",") + "\n"));
+    }
+    fs::write(folder.join("stars.csv"), csv).unwrap();
+    let text = "[machine]\nfile = \"machine.toml\"\n[instrument]\nkind = \"pointing\"\n";
+    fs::write(folder.join("session.toml"), format!("{text}{rest}[[test]]\nname = \"N\"\ndata = \"stars.csv\"\n"))
+        .unwrap();
+    files::session(&folder.join("session.toml"), &ReadOptions::default()).unwrap()
+}
+
+/// Positions over the sky.
+fn positions() -> Vec<[f64; 2]> {
+    (0..60).map(|k| [(k as f64 * 137.5) % 360.0, 20.0 + (k as f64 * 7.3) % 65.0]).collect()
+}
+
+/// The true azimuth and elevation of the line of sight, degrees, from rotation matrices multiplied in order. The errors
+/// are EA, EB, EC of AZ and EA, EB of EL, and the line of sight across, rad.
+fn observed([azimuth, elevation]: [f64; 2], errors: [f64; 6]) -> [f64; 2] {
+    let turn =
+        |about: [f64; 3], angle: f64| Rotation3::from_axis_angle(&Unit::new_normalize(Vector3::from(about)), angle);
+    let small = |[a, b, c]: [f64; 3]| turn([1.0, 0.0, 0.0], a) * turn([0.0, 1.0, 0.0], b) * turn([0.0, 0.0, 1.0], c);
+    let [aa, ba, ca, ae, be, across] = errors;
+    let sight = Vector3::new(1.0, -across, 0.0);
+    let p = small([aa, ba, ca])
+        * turn([0.0, 0.0, -1.0], azimuth.to_radians())
+        * small([ae, be, 0.0])
+        * turn([0.0, -1.0, 0.0], elevation.to_radians())
+        * sight;
+    [(-p.y).atan2(p.x).to_degrees().rem_euclid(360.0), p.z.atan2(p.x.hypot(p.y)).to_degrees()]
+}
+
+/// Errors of a degree and more come back, since the chain is exact.
+#[test]
+fn large_errors_of_a_mount_are_those_of_rotation_matrices() {
+    let errors = [0.02, -0.015, 0.03, 0.01, -0.025, 0.012];
+    let stars: Vec<[f64; 4]> = positions()
+        .into_iter()
+        .map(|at| {
+            let [azimuth, elevation] = observed(at, errors);
+            [at[0], at[1], azimuth, elevation]
+        })
+        .collect();
+    let folder = tempfile::tempdir().unwrap();
+    let session = simulated(folder.path(), &stars, "noise_arcsec = 0.1\n");
+    let ids: Vec<String> = session.unknowns.iter().map(ErrorName::to_string).collect();
+    assert_eq!(ids, ["EA0AZ", "EB0AZ", "EC0AZ", "EA0EL", "EB0EL"]);
+    let (problem, fit) = prepare(&session, 1).unwrap();
+    assert_eq!(fit.rank.identifiable_basis.ncols(), 6);
+    let truth = ["EA0AZ", "EB0AZ", "EC0AZ", "EA0EL", "EB0EL", "line_of_sight.across"].into_iter().zip(errors);
+    for (id, value) in truth {
+        let place = problem.parameters.list.iter().position(|parameter| parameter.id.starts_with(id)).unwrap();
+        assert!((fit.beta[place] - value).abs() < 1e-10, "{id}: {} instead of {value}", fit.beta[place]);
+    }
+    // Signs: IA = EC0AZ, IE = −EB0EL, AN = EB0AZ, AW = −EA0AZ, NPAE = −EA0EL, CA = −across.
+    let found = tpoint::report(&problem, &fit).unwrap();
+    let expected = [("IA", errors[2]), ("IE", -errors[4]), ("AN", errors[1]), ("AW", -errors[0])];
+    for (name, value) in expected.into_iter().chain([("NPAE", -errors[3]), ("CA", -errors[5])]) {
+        let own = term(&found, name).value_arcsec.unwrap() / 3600.0;
+        assert!((own - value.to_degrees()).abs() < 1e-7, "{name}: {own}");
+    }
+}
+
+/// The index error of the elevation and a line of sight that is high have one column: neither has a value, their sum does.
+#[test]
+fn a_term_of_confounded_parameters_is_their_sum() {
+    let stars: Vec<[f64; 4]> = positions()
+        .into_iter()
+        .map(|at| {
+            let [azimuth, elevation] = observed(at, [0.0, 0.0, 0.0, 0.0, -1e-3, 0.0]);
+            [at[0], at[1], azimuth, elevation]
+        })
+        .collect();
+    let folder = tempfile::tempdir().unwrap();
+    simulated(folder.path(), &stars, "noise_arcsec = 0.1\n");
+    let file = folder.path().join("session.toml");
+    let text = fs::read_to_string(&file).unwrap();
+    fs::write(&file, format!("{text}line_of_sight_u_arcsec = inf\n")).unwrap();
+    let session = files::session(&file, &ReadOptions::default()).unwrap();
+    let (problem, fit) = prepare(&session, 1).unwrap();
+    assert!(fit.rank.identifiable_basis.ncols() < problem.parameters.list.len());
+    let found = tpoint::report(&problem, &fit).unwrap();
+    let index = term(&found, "IE");
+    assert_eq!(index.parameters.len(), 2, "{index:?}");
+    assert!((index.value_arcsec.unwrap() - 1e-3_f64.to_degrees() * 3600.0).abs() < 1e-3, "{index:?}");
+}
