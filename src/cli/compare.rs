@@ -22,7 +22,7 @@ pub const HELP: &str = include_str!("help/compare.txt");
 #[derive(Args)]
 pub struct CompareArguments {
     /// Sessions or models, the first one being that with which the others are compared.
-    #[arg(required = true, num_args = 2..)]
+    #[arg(required = true)]
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     data: DataArguments,

@@ -132,6 +132,14 @@ mod tests {
         assert_eq!(HeldOutDecrease::over_blocks(&[3.0], &[1.0]), HeldOutDecrease { by: 2.0, standard_error: 2.0 });
     }
 
+    /// The tail of the normal distribution beyond two standard deviations is 0.02275.
+    #[test]
+    fn a_decrease_has_the_tail_of_a_normal_distribution() {
+        let tail = |by: f64| HeldOutDecrease { by, standard_error: 1.5 }.p_value();
+        assert!((tail(3.0) - 0.022_750_131_9).abs() < 1e-9 && (tail(-3.0) - 0.977_249_868_1).abs() < 1e-9);
+        assert!((tail(0.0) - 0.5).abs() < 1e-12);
+    }
+
     /// Sixteen runs of autocorrelated noise. An effect acts mostly in one of them, and a model predicts nine tenths of
     /// it. Over many draws of the noise the scatter of the decrease equals its standard error.
     #[test]

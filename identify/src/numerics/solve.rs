@@ -111,6 +111,8 @@ mod tests {
         let found = directions.solve(&c, 0.0);
         // Mean 2.75 at the mean abscissa 1.5, and the slope 5.5/5.
         assert!((found[1] - 1.1).abs() < 1e-12 && (found[0] - (2.75 - 1.5 * 1.1)).abs() < 1e-12, "{found:?}");
+        // Of the sum of squares 39 the residual keeps 8.75 - 5.5²/5.
+        assert!((directions.explained(&c) - (39.0 - 2.7)).abs() < 1e-12);
         let root = directions.inverse_root();
         let covariance = &root * root.transpose();
         for (place, expected) in [((0, 0), 14.0 / 20.0), ((0, 1), -6.0 / 20.0), ((1, 1), 4.0 / 20.0)] {

@@ -102,5 +102,5 @@ fn in_words(id: &str) -> String {
         Some((quantity, group)) => (quantity, format!(" ({group})")),
         None => (id, String::new()),
     };
-    quantity.replace('_', " ").replace('.', " ") + &group
+    quantity.replace(['_', '.'], " ") + &group
 }

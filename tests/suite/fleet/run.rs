@@ -166,7 +166,7 @@ fn a_killed_run_is_continued() {
     for _ in 0..2 {
         let before = count();
         let mut child = Command::new(env!("CARGO_BIN_EXE_abbe"))
-            .args(["run", "fleet", "--out", "results", "--only", "EX", "--quiet"])
+            .args(["fleet", "run", "fleet", "--out", "results", "--only", "EX", "--quiet"])
             .current_dir(place.0.path())
             .stdout(Stdio::null())
             .stderr(Stdio::null())
@@ -195,7 +195,7 @@ fn a_killed_run_is_continued() {
 /// Starts `abbe fleet run` on the folder.
 fn start(place: &TestFolder, summary: &str) -> std::process::Child {
     Command::new(env!("CARGO_BIN_EXE_abbe"))
-        .args(["run", "fleet", "--out", "results", "--only", "EX", "--quiet", "--json", summary])
+        .args(["fleet", "run", "fleet", "--out", "results", "--only", "EX", "--quiet", "--json", summary])
         .current_dir(place.0.path())
         .stdout(Stdio::null())
         .stderr(Stdio::null())

@@ -222,8 +222,8 @@ fn a_message_quotes_80_characters_of_a_long_argument() {
         vec!["new", "x", "--from-code", &long],
         vec!["volumetric", session, "--axis", &long],
         vec!["schema", &long],
-        vec!["run", session, "--out", "x", "--part", &long],
-        vec!["history", &long],
+        vec!["fleet", "run", session, "--out", "x", "--part", &long],
+        vec!["fleet", "history", &long],
     ] {
         let output = abbe(&arguments);
         let what: Vec<String> = arguments.iter().map(|argument| argument.chars().take(20).collect()).collect();

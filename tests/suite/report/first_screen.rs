@@ -151,14 +151,14 @@ fn results_open_with_three_statements() {
     for file in std::fs::read_dir(measured.parent().unwrap()).unwrap().map(|entry| entry.unwrap().path()) {
         std::fs::copy(&file, at(file.file_name().unwrap().to_str().unwrap())).unwrap();
     }
-    let analysed = abbe(&["run", text(&session), "--out", text(&results), "--no-trace", "--quiet"]);
+    let analysed = abbe(&["fleet", "run", text(&session), "--out", text(&results), "--no-trace", "--quiet"]);
     assert!(analysed.status.success(), "{}", String::from_utf8_lossy(&analysed.stderr));
     for command in [
         vec!["fit", text(&measured), "--save", text(&model)],
         vec!["plan", text(&measured), "--no-effects"],
         vec!["validate", text(&model), text(&measured)],
         vec!["compare", text(&model), text(&measured), "--places", "0"],
-        vec!["history", text(&results)],
+        vec!["fleet", "history", text(&results)],
     ] {
         let (json, page) = (at("result.json"), at("result.html"));
         let output = abbe(&[&command[..], &["--json", text(&json), "--report", text(&page)]].concat());
