@@ -65,6 +65,10 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Failure> {
     }
     let common = &arguments.common;
     let outputs = common.output.prepared(&[])?;
+    if arguments.inputs.len() < 2 {
+        return Err(Failure::CommandLine("at least two sessions or models are expected; name another".into()));
+    }
+    arguments.plausibility.belongs_to("--repeated", arguments.repeated)?;
     if arguments.repeated {
         return repeated::run(&arguments.inputs, &arguments.data, arguments.plausibility, common, &outputs);
     }

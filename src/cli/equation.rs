@@ -13,7 +13,6 @@ use clap::Args;
 
 use self::form::FormArguments;
 use super::failure::Failure;
-use super::folder;
 use super::message::{Kind, tell};
 use super::output::Outputs;
 
@@ -49,7 +48,7 @@ pub struct EquationArguments {
     #[command(flatten)]
     form: FormArguments,
     #[command(flatten)]
-    folder: folder::ForceArguments,
+    folder: super::ForceArguments,
 }
 
 impl EquationArguments {

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use abbe::temporary::{self, TemporaryFolder};
-use clap::Args;
 
 use super::failure::Failure;
 use super::output;
@@ -91,14 +90,6 @@ pub fn add(folder: &Path, files: &[(String, Vec<u8>)], read: &[PathBuf], force: 
 
 fn fault(folder: &Path, source: std::io::Error) -> Failure {
     Failure::Write { path: folder.display().to_string(), source }
-}
-
-/// `--force`: an option of every command that writes a folder. Files that options name are always replaced.
-#[derive(Args, Clone, Copy)]
-pub struct ForceArguments {
-    /// Replace files in an existing folder.
-    #[arg(long)]
-    pub force: bool,
 }
 
 /// Whether the folder exists. `force` is the option of the user.

@@ -117,7 +117,7 @@ enum Command {
         shell: clap_complete::Shell,
     },
     /// Analyse many sessions and show machines over time; simulate studies.
-    #[command(subcommand)]
+    #[command(subcommand, after_help = fleet::HELP)]
     Fleet(Box<fleet::Fleet>),
     /// Turn foreign files of readings into a session.
     #[command(after_help = import::HELP)]
@@ -180,6 +180,16 @@ pub struct PlausibilityArguments {
 }
 
 impl PlausibilityArguments {
+    /// Refuses the option without another one to which it belongs.
+    fn belongs_to(self, other: &str, is_given: bool) -> Result<(), Failure> {
+        if self.allow_implausible && !is_given {
+            return Err(Failure::CommandLine(format!(
+                "`--allow-implausible` belongs to `{other}`; state both or none"
+            )));
+        }
+        Ok(())
+    }
+
     /// Refuses estimates that mean nothing: location errors of a robot that are a large share of its links.
     fn check(self, found: &Plausibility) -> Result<(), Failure> {
         let conflict = found.conflicts.iter().find(|conflict| conflict.kind == ConflictKind::LocationError);
@@ -200,6 +210,14 @@ impl SessionArguments {
     fn commands(&self) -> Commands {
         Commands::of(&self.session, self.data.data.as_deref(), self.data.allow_outside)
     }
+}
+
+/// `--force`: an option of every command that writes a folder. Files that options name are always replaced.
+#[derive(Args, Clone, Copy)]
+pub struct ForceArguments {
+    /// Replace files in an existing folder.
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Arguments of every command with a result that depends on a seed.

@@ -37,7 +37,7 @@ pub struct NcArguments {
     #[command(flatten)]
     motion: MotionArguments,
     #[command(flatten)]
-    folder: folder::ForceArguments,
+    folder: super::ForceArguments,
 }
 
 /// Runs `abbe nc`.

@@ -52,7 +52,7 @@ pub struct NewArguments {
     #[arg(long)]
     list: bool,
     #[command(flatten)]
-    folder: folder::ForceArguments,
+    folder: super::ForceArguments,
 }
 
 /// Runs `abbe new`.

@@ -34,7 +34,7 @@ pub struct PaperArguments {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
-    folder: folder::ForceArguments,
+    folder: super::ForceArguments,
     /// The parts to write, separated by commas [default: all that the sessions have].
     ///
     /// Example: --parts identifiability,bias

@@ -49,7 +49,7 @@ pub struct OutputArguments {
     #[arg(long, requires = "plots")]
     png: bool,
     #[command(flatten)]
-    pub folder: folder::ForceArguments,
+    pub folder: super::ForceArguments,
     /// List everything that the first screen folds.
     #[arg(long)]
     all: bool,

@@ -271,7 +271,7 @@ mod tests {
     /// and standard deviation 1, so that 5 exceeds them by 3.
     #[test]
     fn the_statistic_that_deviates_most_is_judged_by_all_draws() {
-        let draw = |k: usize| if k == 18 { 0.0 } else { (if k.is_multiple_of(2) { 1.0 } else { -1.0 }) };
+        let draw = |k: usize| [1.0, -1.0][k % 2] * f64::from(u8::from(k < 18));
         let none: Vec<f64> = (0..19).map(|k| 10.0 + 4.0 * draw(k)).collect();
         let shifted: Vec<f64> = (0..19).map(|k| 2.0 + draw(k)).collect();
         let (place, p_value, excess) = judged(&[12.0, 5.0], vec![none.clone(), shifted.clone()]).unwrap();

@@ -8,6 +8,12 @@ use clap::Subcommand;
 
 use super::failure::Failure;
 
+/// Examples of `abbe fleet`.
+pub const HELP: &str = "Examples:
+  abbe fleet run sessions/hermle-c600u/measured/session.toml --out results --no-trace
+  abbe fleet history results
+  abbe fleet study studies/small.toml --out study";
+
 /// The commands of `abbe fleet`.
 #[derive(Subcommand)]
 pub enum Fleet {

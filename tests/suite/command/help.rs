@@ -82,7 +82,11 @@ fn every_example_of_the_help_runs() {
     // Some examples read the outputs of others: simulated readings come first.
     let mut later = Vec::new();
     for command in commands {
-        let of_command = examples(&help(&[command, "--help"]));
+        let mut of_command = examples(&help(&[command, "--help"]));
+        if command == "fleet" {
+            of_command
+                .extend(["run", "history", "study"].iter().flat_map(|own| examples(&help(&["fleet", own, "--help"]))));
+        }
         assert!(
             of_command.iter().any(|line| line.starts_with(&format!("abbe {command}"))),
             "abbe {command} --help has no example"

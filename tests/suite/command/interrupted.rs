@@ -195,7 +195,7 @@ fn an_interrupted_fit_ends_by_the_signal() {
 #[test]
 fn signals_are_tested_in_the_background_too() {
     let here = std::env::current_exe().unwrap();
-    let name = "suite::interrupted::an_interrupted_fit_ends_by_the_signal";
+    let name = "suite::command::interrupted::an_interrupted_fit_ends_by_the_signal";
     let run = Command::new("sh")
         .args(["-c", "trap '' INT; exec \"$0\" --exact \"$1\""])
         .args([text(&here), name])

@@ -102,7 +102,7 @@ fn any_structural_code_gives_a_plan_that_runs() {
             let reach = positions.flatten().fold(0.0_f64, |reach, position| reach.max(position.abs()));
             let [from, to] = axis.travel.unwrap();
             assert!(
-                (to - from) / 2.0 <= (reach + 250.0).max(USUAL_HALF_TRAVEL_MM),
+                (to - from) / 2.0 <= (reach + 350.0).max(USUAL_HALF_TRAVEL_MM),
                 "{code} {}: {from} to {to}, {reach}",
                 axis.name
             );

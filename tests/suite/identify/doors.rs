@@ -115,7 +115,7 @@ impl Door {
     #[track_caller]
     fn record_agrees(&self, walk: &Walk, next: &str) {
         let results = self.at("results");
-        self.run(&["run", next, "--no-trace", "--out", text(&results)], "run.json");
+        self.run(&["fleet", "run", next, "--no-trace", "--out", text(&results)], "run.json");
         let record = parsed(&files_below(&results.join("results"))[0]);
         assert_eq!(record["goodness"], walk.fit["outcome"]["goodness"]["verdict"]);
         for own in list(&walk.fit["parameters"], "fit") {

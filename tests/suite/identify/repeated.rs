@@ -148,4 +148,6 @@ fn the_command_compares_files() {
     refused(1, &[text(&other)], "is not a repeat of");
     refused(2, &[text(&files[1]), "--shared", "bar"], "cannot be used with");
     refused(1, &[text(&plan)], "has no readings");
+    let alone = abbe(&["compare", text(&files[0]), text(&files[1]), "--allow-implausible"]);
+    assert_eq!(alone.status.code(), Some(2));
 }

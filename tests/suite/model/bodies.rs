@@ -179,7 +179,7 @@ fn a_surface_is_an_input_of_the_session() {
     assert_eq!(std::fs::read(copy.join("body.stl")).unwrap(), contents);
     let session = copy.join("session.toml");
     let keys = || -> Vec<String> {
-        run(&["run", text(&session), "--out", text(&records), "--no-trace", "--quiet"]);
+        run(&["fleet", "run", text(&session), "--out", text(&records), "--no-trace", "--quiet"]);
         let mut names: Vec<String> = walk(&records).iter().map(|path| path.display().to_string()).collect();
         names.sort();
         names
