@@ -116,7 +116,7 @@ pub fn of_model(model: &IdentifiedModel) -> Compensation {
     let machine = &model.machine;
     let list = &model.parameters;
     for (j, parameter) in list.iter().enumerate() {
-        if parameter.role != Role::Error || !model.is_identifiable(j) {
+        if parameter.role != Role::Error || !parameter.identifiable {
             continue;
         }
         match ErrorName::parse(&parameter.id) {
@@ -142,7 +142,7 @@ pub fn of_model(model: &IdentifiedModel) -> Compensation {
         let of_effect = |wanted: usize| {
             list.iter().position(|other| other.role == Role::Coefficient { effect: index, coefficient: wanted })
         };
-        let coefficients = (0..effect.shape.coefficients()).map(|k| of_effect(k).filter(|j| model.is_identifiable(*j)));
+        let coefficients = (0..effect.shape.coefficients()).map(|k| of_effect(k).filter(|j| list[*j].identifiable));
         let (Some(axis), Some(coefficients)) =
             (machine.axis_index(&error.axis), coefficients.collect::<Option<Vec<usize>>>())
         else {

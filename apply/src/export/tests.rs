@@ -25,6 +25,7 @@ pub(super) fn model(machine: Machine, errors: &[(String, f64)]) -> IdentifiedMod
             unit: Unit::of(abbe_model::instrument::InternalUnit::Millimetre),
             value: *value,
             held: false,
+            identifiable: true,
             prior: Prior::Free,
             size: 1.0,
         })

@@ -147,10 +147,18 @@ pub struct Parameter {
     pub internal: f64,
     /// Whether it is held at nominal, since it is not separable from other parameters.
     pub held: bool,
+    /// Whether the readings determine it by itself, not only in combination with others.
+    #[serde(default = "by_itself")]
+    pub identifiable: bool,
     /// Standard uncertainty of its Gaussian prior about 0, internal unit; `null` without a prior.
     pub prior_u: Option<Positive>,
     /// Physical size, internal unit.
     pub size: Positive,
+}
+
+/// Models of earlier versions do not state it: what is not held counts.
+fn by_itself() -> bool {
+    true
 }
 
 /// What a parameter is.

@@ -35,9 +35,6 @@ pub use document::{InputFile, MotionRange, Provenance};
 pub use range::DriverRange;
 pub use read::{of_source, read};
 
-/// Share of a parameter in a null direction, in physical sizes, above which the readings do not determine it by itself.
-const UNDETERMINED: f64 = 1e-6;
-
 /// A parameter of a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelParameter {
@@ -51,6 +48,8 @@ pub struct ModelParameter {
     pub value: f64,
     /// Whether it is held at nominal, since the readings do not separate it from other parameters.
     pub held: bool,
+    /// Whether the readings determine it by itself, not only in combination with others.
+    pub identifiable: bool,
     /// The prior of the fit.
     pub prior: Prior,
     /// Physical size, internal units: 1 mm, 0.01 rad, or the value that changes the component by that much.
@@ -113,13 +112,6 @@ impl IdentifiedModel {
     /// Standard uncertainty of a parameter, internal units; 0 if it is held.
     pub fn u(&self, parameter: usize) -> f64 {
         self.covariance[(parameter, parameter)].max(0.0).sqrt()
-    }
-
-    /// Whether the readings determine a parameter by itself.
-    pub fn is_identifiable(&self, parameter: usize) -> bool {
-        let size = self.parameters[parameter].size;
-        self.is_estimated(parameter)
-            && self.null_directions.iter().all(|direction| (direction[parameter] / size).abs() < UNDETERMINED)
     }
 
     /// Whether the readings determine a parameter, alone or in a combination. The others stay at nominal.

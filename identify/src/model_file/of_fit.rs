@@ -29,6 +29,7 @@ impl IdentifiedModel {
             unit: parameter.unit.clone(),
             value: base.beta[j],
             held: base.held.contains(&j),
+            identifiable: fit.rank.is_identifiable(j),
             prior: parameter.prior,
             size: parameter.size,
         });

@@ -237,6 +237,7 @@ fn parameter(
         unit: Unit { name: entry.unit.clone(), display_per_internal: entry.display_per_internal.0 },
         value: entry.internal,
         held: entry.held,
+        identifiable: entry.identifiable && !entry.held,
         prior: entry.prior_u.map_or(Prior::Free, |Positive(u)| Prior::Gaussian(u)),
         size: entry.size.0,
     })

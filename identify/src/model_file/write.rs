@@ -104,6 +104,7 @@ impl IdentifiedModel {
             display_per_internal: Positive(display),
             internal: parameter.value,
             held: parameter.held,
+            identifiable: parameter.identifiable,
             prior_u: match parameter.prior {
                 Prior::Gaussian(u) => Some(Positive(u)),
                 Prior::Free | Prior::Known => None,
