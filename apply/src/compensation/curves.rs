@@ -115,7 +115,7 @@ pub fn of_model(model: &IdentifiedModel) -> Compensation {
     let mut result = Compensation::default();
     let machine = &model.machine;
     let list = &model.parameters;
-    for (j, parameter) in list.iter().enumerate() {
+    for parameter in list {
         if parameter.role != Role::Error || !parameter.identifiable {
             continue;
         }
