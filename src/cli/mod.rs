@@ -307,6 +307,7 @@ fn read_session(arguments: &SessionArguments, outputs: &Outputs) -> Result<(Sess
 
 #[cfg(test)]
 mod tests {
+    use clap::error::ErrorKind;
     use clap::{Arg, Command, CommandFactory};
 
     use super::Arguments;
@@ -450,5 +451,74 @@ mod tests {
                 assert!(parsed.is_ok(), "{}: {example}: {}", command.get_name(), parsed.unwrap_err());
             }
         }
+    }
+
+    /// The words of a line of a shell, up to what the shell itself reads; `None` if a variable stands in it.
+    fn words(line: &str) -> Option<Vec<String>> {
+        let (mut words, mut word, mut quote) = (Vec::new(), None::<String>, None::<char>);
+        for sign in line.chars() {
+            match (quote, sign) {
+                (Some(open), _) if open == sign => quote = None,
+                (Some(_), _) => word.get_or_insert_default().push(sign),
+                (None, '"' | '\'') => {
+                    quote = Some(sign);
+                    word.get_or_insert_default();
+                }
+                (None, '$' | '<' | '{') => return None,
+                (None, '|' | '>' | ';' | '&' | '#') => break,
+                (None, ' ') => words.extend(word.take()),
+                (None, _) => word.get_or_insert_default().push(sign),
+            }
+        }
+        words.extend(word);
+        Some(words)
+    }
+
+    /// Every command line of the README and of the manual is one that the parser accepts.
+    #[test]
+    fn command_lines_of_the_manual_are_accepted() {
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+        let mut files = vec![root.join("README.md"), root.join("CONTRIBUTING.md")];
+        let mut folders = vec![root.join("docs")];
+        while let Some(folder) = folders.pop() {
+            for entry in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+                match entry.extension() {
+                    None if entry.is_dir() => folders.push(entry),
+                    Some(extension) if extension == "md" => files.push(entry),
+                    _ => {}
+                }
+            }
+        }
+        let (mut count, mut wrong) = (0, Vec::new());
+        for file in files {
+            let text = std::fs::read_to_string(&file).unwrap().replace("\\\n", " ");
+            // In a sentence values may be placeholders, and what is required may be left out; options and commands exist.
+            let inline = text.split('`').skip(1).step_by(2).filter(|piece| piece.starts_with("abbe "));
+            for line in inline.filter(|piece| !piece.contains(['…', '\n', '\\']) && !piece.contains("COMMAND")) {
+                let found = words(line).map(|words| Arguments::command().try_get_matches_from(&words));
+                if let Some(Err(found)) = found
+                    && matches!(found.kind(), ErrorKind::UnknownArgument | ErrorKind::InvalidSubcommand)
+                {
+                    wrong.push(format!("{}: {line}: {found}", file.display()));
+                }
+            }
+            // Odd pieces are blocks of code.
+            let blocks = text.split("\n```").skip(1).step_by(2);
+            for line in
+                blocks.filter(|block| block.starts_with("console") || block.starts_with("sh\n")).flat_map(str::lines)
+            {
+                let Some(words) = Some(line).filter(|line| line.starts_with("abbe ")).and_then(words) else {
+                    continue;
+                };
+                count += 1;
+                if let Err(found) = Arguments::command().try_get_matches_from(&words)
+                    && found.use_stderr()
+                {
+                    wrong.push(format!("{}: {line}: {found}", file.display()));
+                }
+            }
+        }
+        assert!(count > 80, "{count} command lines");
+        assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     }
 }
