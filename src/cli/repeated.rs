@@ -2,12 +2,14 @@
 
 use std::path::PathBuf;
 
+use abbe::apply::compare::Input;
 use abbe::identify::{fit, repeated};
 
+use super::compare::{self, InputFiles};
 use super::failure::Failure;
 use super::output::{self, Outputs};
 use super::results::Read;
-use super::{CommonArguments, DataArguments, PlausibilityArguments, SessionArguments, read_session};
+use super::{CommonArguments, DataArguments, PlausibilityArguments};
 use crate::report::block::Report;
 use crate::report::repeated as present;
 
@@ -24,8 +26,13 @@ pub fn run(
         if all[..place].iter().any(|earlier| output::is_same(earlier, path)) {
             return Err(Failure::Other(format!("{} is named twice; name each repeated session once", path.display())));
         }
-        let arguments = SessionArguments { session: path.clone(), data: data.clone() };
-        read.push(read_session(&arguments, outputs)?);
+        match compare::read(path, &data.options(), outputs)? {
+            (Input::Session(session), InputFiles::Session(sources)) => read.push((*session, *sources)),
+            _ => {
+                let file = path.display();
+                return Err(Failure::Other(format!("{file} is a model; `--repeated` compares the fits of sessions")));
+            }
+        }
     }
     let (mut sessions, mut warnings) = (Vec::with_capacity(all.len()), Vec::new());
     for (path, (session, _)) in all.iter().zip(&read) {

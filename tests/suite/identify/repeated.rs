@@ -148,6 +148,9 @@ fn the_command_compares_files() {
     refused(1, &[text(&other)], "is not a repeat of");
     refused(2, &[text(&files[1]), "--shared", "bar"], "cannot be used with");
     refused(1, &[text(&plan)], "has no readings");
+    let model = folder.path().join("model.json");
+    assert!(abbe(&["fit", text(&files[0]), "--save", text(&model), "--quiet"]).status.success());
+    refused(1, &[text(&model)], "is a model; `--repeated` compares the fits of sessions");
     let alone = abbe(&["compare", text(&files[0]), text(&files[1]), "--allow-implausible"]);
     assert_eq!(alone.status.code(), Some(2));
 }
