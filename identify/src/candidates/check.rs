@@ -105,11 +105,50 @@ fn gains_are_those_of_least_squares() {
                 let found = gains[k].gain;
                 assert!((found - gain).abs() <= 1e-6 * gain + 1e-7 * before, "{k}: {found} {gain} of {before}");
                 let channel = TunedChannel::of(&columns, &tuning, set);
-                let again = channel.gain(&channel.effect_of(&set.basis));
+                let basis = Mat::from_fn(set.basis.nrows(), set.count, |i, k| f64::from(set.basis[(i, k)]));
+                let again = channel.gain(&channel.effect_of(basis));
                 assert!((found - again).abs() <= 1e-8 * before, "{k}: {found} {again}");
                 compared += 1;
             }
         }
         assert!(compared > 100, "{compared}");
     }
+}
+
+/// Candidates that come in parts, with null draws that are kept, have the gains and the best null scores of all candidates
+/// together.
+#[test]
+fn candidates_in_parts_have_the_scores_of_all_together() {
+    const DRAWS: usize = 5;
+    let (problem, beta) = problem(&[0.5]);
+    let columns = Columns::new(&problem, &beta);
+    let (model, residual) = model(&columns, &beta);
+    let model = Arc::new(model);
+    let sets = candidates(&problem, &columns, 197);
+    let rank = model.ncols();
+    let prior = || PriorGram { base: Mat::zeros(rank, rank), base_y: vec![0.0; rank] };
+    let draw = |k: usize| -> Vec<f64> { (0..residual.len()).map(|i| ((i * (k + 3) + k) as f64).sin()).collect() };
+    let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
+    let scores = |gram: &Gram<'_>| {
+        let trained = TrainedModel::new(gram, &[], &folds).unwrap();
+        let gains: Vec<f64> = trained.gains(&|_| true).unwrap().into_iter().map(|gain| gain.gain).collect();
+        (gains, trained.null_best(&[], &vec![0.0; gram.candidates()], 1.0).unwrap())
+    };
+    let mut together = Gram::new(&columns, sets.clone(), Arc::clone(&model), &residual, prior());
+    together.take_draws((0..DRAWS).map(draw), false, &|| true).unwrap();
+    let (gains, best) = scores(&together);
+    let mut without = Gram::new(&columns, Vec::new(), model, &residual, prior());
+    without.take_draws((0..DRAWS).map(draw), true, &|| true).unwrap();
+    let (mut in_parts, mut best_in_parts) = (Vec::new(), vec![f64::NEG_INFINITY; DRAWS]);
+    for part in sets.chunks(7) {
+        let mut gram = without.clone();
+        gram.append(part.to_vec());
+        let (gains, best) = scores(&gram);
+        in_parts.extend(gains);
+        best_in_parts.iter_mut().zip(best).for_each(|(a, b)| *a = a.max(b));
+    }
+    assert!(gains.len() > 20 && best.iter().all(|score| *score > 0.0), "{} {best:?}", gains.len());
+    let near =
+        |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-9 * a.abs());
+    assert!(near(&gains, &in_parts) && near(&best, &best_in_parts), "{best:?} {best_in_parts:?}");
 }

@@ -82,13 +82,15 @@ impl<'t> TunedChannel<'t> {
 
     /// The effect with a shape.
     pub fn effect(&self, shape: &Shape) -> TunedEffect {
-        self.effect_of(&self.columns.reshaped(shape, &self.set.channel).basis)
+        let columns = self.columns.basis(shape, &self.set.channel);
+        let rows = columns.first().map_or(0, Vec::len);
+        self.effect_of(Mat::from_fn(rows, columns.len(), |i, k| columns[k][i]))
     }
 
     /// The effect with basis functions (states × columns).
-    pub(super) fn effect_of(&self, basis: &Arc<Mat<f64>>) -> TunedEffect {
-        let (local, cross, own) = self.products.of(basis);
-        TunedEffect { local, basis: Mat::clone(basis), products: EffectProducts { cross, own } }
+    pub(super) fn effect_of(&self, basis: Mat<f64>) -> TunedEffect {
+        let (local, cross, own) = self.products.of(&basis);
+        TunedEffect { local, basis, products: EffectProducts { cross, own } }
     }
 
     /// The gain of an effect.

@@ -57,6 +57,12 @@ fn to_six_decimals(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
 
+/// Rounds a logarithm of a probability to two decimals, for the same reason: it is as large as 10⁵, and basis functions are in
+/// single precision.
+fn to_two_decimals(value: f64) -> f64 {
+    (value * 1e2).round() / 1e2
+}
+
 /// The order of two equally good candidates: by description length, then by identifier, then by index.
 fn simplest_first(search: &SearchState<'_>, a: usize, b: usize) -> Ordering {
     let [first, second] = [a, b].map(|candidate| &search.candidates[candidate]);
@@ -91,7 +97,7 @@ fn competing_effects(
         })
         .map(|(candidate, gain)| {
             let evidence = search.evidence_for(candidate, gain, variance);
-            (to_six_decimals(evidence), candidate)
+            (to_two_decimals(evidence), candidate)
         })
         .collect();
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| simplest_first(search, a.1, b.1)));
@@ -163,8 +169,8 @@ pub(super) fn aliases(
         }
     }
     aliases.sort_by(|a, b| {
-        to_six_decimals(b.ln_probability_ratio())
-            .total_cmp(&to_six_decimals(a.ln_probability_ratio()))
+        to_two_decimals(b.ln_probability_ratio())
+            .total_cmp(&to_two_decimals(a.ln_probability_ratio()))
             .then_with(|| to_six_decimals(b.cosine).total_cmp(&to_six_decimals(a.cosine)))
             .then_with(|| simplest_first(search, a.candidate, b.candidate))
     });

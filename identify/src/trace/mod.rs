@@ -323,6 +323,9 @@ fn trace_or_interrupted(
         let (model, prior) = (start.model.clone(), start.prior());
         remainder::structure(problem, &columns, model, &start.residual, null(SINGLE), prior, &should_continue)
     };
+    let structure_before = || policy.tests_structure.then(structure_before).transpose();
+    // In a long session the arrays of the structure test are freed before those of the library are formed.
+    let tested = (columns.rows() > MAX_AT_THE_SAME_TIME).then(structure_before);
     let searched = screening::searched_candidates(problem, &columns, options)?;
     let candidate_count = searched.len();
     progress(Progress::Screening(candidate_count));
@@ -334,11 +337,9 @@ fn trace_or_interrupted(
         gram.take_draws(null(BLOCK), true, &should_continue)?;
         Ok::<_, IdentifyError>(gram)
     };
-    let structure_before = || policy.tests_structure.then(structure_before).transpose();
-    let (structure_before, gram) = if columns.rows() <= MAX_AT_THE_SAME_TIME {
-        parallel::both(structure_before, gram)
-    } else {
-        (structure_before(), gram())
+    let (structure_before, gram) = match tested {
+        Some(tested) => (tested, gram()),
+        None => parallel::both(structure_before, gram),
     };
     let (gram, structure_before) = (gram?, structure_before?);
     interrupt.check()?;

@@ -36,9 +36,9 @@ pub fn draws<'d>(
     count: usize,
     block: usize,
     seed: u64,
-) -> impl ExactSizeIterator<Item = Vec<f64>> + use<'d> {
+) -> impl ExactSizeIterator<Item = Vec<f64>> + Send + use<'d> {
     let mut generator = Pcg64::seed_from_u64(seed ^ 0x6e75_6c6c);
-    let mut draw: Box<dyn FnMut() -> Vec<f64> + 'd> = if Policy::of(problem).null == NullSource::SignFlips {
+    let mut draw: Box<dyn FnMut() -> Vec<f64> + Send + 'd> = if Policy::of(problem).null == NullSource::SignFlips {
         let pose_of_row = &problem.folds.pose_of_row;
         let poses: Vec<usize> =
             columns.origin_of_rows().into_iter().map(|(test, row, _)| pose_of_row[test][row]).collect();

@@ -20,6 +20,7 @@ use crate::candidates::columns::{Columns, EffectColumns};
 use crate::candidates::gain::TrainedModel;
 use crate::candidates::gram::{Gram, PriorGram};
 use crate::error::IdentifyError;
+use crate::numerics::parallel;
 use crate::numerics::tails::ln_chi_square_tail;
 use crate::problem::Problem;
 
@@ -42,19 +43,31 @@ impl Structure {
     }
 }
 
-/// One detector.
+/// One detector: a term on one channel of the readings of a test.
 struct Detector {
-    column_set: EffectColumns,
+    effect: Effect,
+    /// The channel of the readings.
+    channel: usize,
+    by_direction: bool,
+    /// The rows in which it acts, if not in all.
+    rows: Option<Range<usize>>,
     description: String,
 }
 
-fn detectors(problem: &Problem, columns: &Columns<'_>) -> Vec<Detector> {
+impl Detector {
+    /// Its columns. `None` if the data lack its driver.
+    fn columns(&self, columns: &Columns<'_>) -> Option<EffectColumns> {
+        columns.reading_columns(&self.effect, self.channel, self.by_direction, self.rows.as_ref())
+    }
+}
+
+fn detectors(problem: &Problem) -> Vec<Detector> {
     let machine = &problem.session.machine;
     let mut detectors = Vec::new();
     for (test, model) in problem.tests.iter().zip(&problem.models) {
         let Some(readings) = &test.readings else { continue };
         let channels = model.channels();
-        let mut of_test = TestResidual { columns, name: &test.name, readings, channels, detectors: Vec::new() };
+        let mut of_test = TestResidual { name: &test.name, readings, channels, detectors: Vec::new() };
         for (axis, column) in readings.positions.iter().enumerate() {
             let low = column.iter().copied().fold(f64::INFINITY, f64::min);
             let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -69,15 +82,14 @@ fn detectors(problem: &Problem, columns: &Columns<'_>) -> Vec<Detector> {
 }
 
 /// Collects the detectors of one test.
-struct TestResidual<'t, 'p> {
-    columns: &'t Columns<'p>,
+struct TestResidual<'t> {
     name: &'t str,
     readings: &'t Readings,
     channels: &'t [Channel],
     detectors: Vec<Detector>,
 }
 
-impl TestResidual<'_, '_> {
+impl TestResidual<'_> {
     /// Adds a shape over each channel of the readings.
     fn add(&mut self, driver: &Driver, shape: Shape, description: String) {
         self.add_confined(driver, shape, false, None, description);
@@ -94,12 +106,12 @@ impl TestResidual<'_, '_> {
     ) {
         let effect = Effect::new(Component::Reading(self.name.to_string()), driver.clone(), shape);
         for (channel, label) in labels(self.channels).into_iter().enumerate() {
-            let column_set = self.columns.reading_columns(&effect, channel, by_direction, rows);
             let description = match label {
                 "" => description.clone(),
                 label => format!("{description} in {label}"),
             };
-            self.detectors.extend(column_set.map(|column_set| Detector { column_set, description }));
+            let (effect, rows) = (effect.clone(), rows.cloned());
+            self.detectors.push(Detector { effect, channel, by_direction, rows, description });
         }
     }
 
@@ -183,6 +195,36 @@ fn curve(from: f64, to: f64, intervals: usize) -> Shape {
     Shape::Curve(Curve { from, to, intervals, closed: false })
 }
 
+/// Number of entries of the basis functions of detectors from which on they are a batch: 32 MB.
+const MAX_ENTRIES: usize = 8_000_000;
+/// Detectors whose columns are formed together.
+const AT_ONCE: usize = 64;
+
+/// Detectors whose products are formed together, and the rest.
+struct Batch<'d> {
+    detectors: Vec<&'d Detector>,
+    sets: Vec<EffectColumns>,
+    rest: &'d [Detector],
+}
+
+impl<'d> Batch<'d> {
+    fn of(detectors: &'d [Detector], columns: &Columns<'_>) -> Batch<'d> {
+        let mut batch = Batch { detectors: Vec::new(), sets: Vec::new(), rest: detectors };
+        let mut entries = 0;
+        while entries < MAX_ENTRIES && !batch.rest.is_empty() {
+            let (part, rest) = batch.rest.split_at(AT_ONCE.min(batch.rest.len()));
+            let sets = parallel::map(part.len(), &|k| part[k].columns(columns));
+            for (detector, set) in part.iter().zip(sets).filter_map(|(detector, set)| Some((detector, set?))) {
+                entries += set.basis.nrows() * set.basis.ncols();
+                batch.detectors.push(detector);
+                batch.sets.push(set);
+            }
+            batch.rest = rest;
+        }
+        batch
+    }
+}
+
 /// Tests a residual for structure that a model, given by its orthonormal columns, does not explain.
 ///
 /// # Errors
@@ -192,41 +234,55 @@ pub fn structure(
     columns: &Columns<'_>,
     model: Arc<Mat<f64>>,
     residual: &[f64],
-    null: impl ExactSizeIterator<Item = Vec<f64>>,
+    null: impl ExactSizeIterator<Item = Vec<f64>> + Send,
     prior: PriorGram,
     should_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Structure, IdentifyError> {
-    let detectors = detectors(problem, columns);
-    if detectors.is_empty() {
+    let detectors = detectors(problem);
+    let mut batch = Batch::of(&detectors, columns);
+    // In a long session the detectors come in batches, for which the null draws are kept.
+    let in_batches = !batch.rest.is_empty();
+    let sets = if in_batches { Vec::new() } else { std::mem::take(&mut batch.sets) };
+    let mut first = Gram::new(columns, sets, model, residual, prior);
+    first.take_draws(null, in_batches, should_continue)?;
+    let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
+    let mut best: Option<(&Detector, f64, f64)> = None;
+    let mut null_best = vec![f64::NEG_INFINITY; first.draws()];
+    loop {
+        if !should_continue() {
+            return Err(IdentifyError::Interrupted);
+        }
+        let mut gram = first.clone();
+        if in_batches {
+            gram.append(std::mem::take(&mut batch.sets));
+        }
+        let trained = TrainedModel::new(&gram, &[], &folds)?;
+        let gains = trained.gains(&|_| true)?;
+        for (detector, gain) in batch.detectors.iter().zip(gains).filter(|(_, gain)| gain.freedom > 0) {
+            let score = -ln_chi_square_tail(gain.gain, gain.freedom);
+            if best.is_none_or(|(_, best, _)| score > best) {
+                best = Some((detector, score, gain.gain - gain.freedom as f64));
+            }
+        }
+        let of_batch = trained.null_best(&[], &vec![0.0; batch.detectors.len()], 1.0)?;
+        null_best.iter_mut().zip(of_batch).for_each(|(best, score)| *best = best.max(score));
+        if batch.rest.is_empty() {
+            break;
+        }
+        batch = Batch::of(batch.rest, columns);
+    }
+    let Some((detector, score, excess)) = best else {
         return Ok(Structure {
             p_value: 1.0,
             excess: 0.0,
             description: "no detector applies to these readings".to_string(),
         });
-    }
-    let column_sets: Vec<EffectColumns> = detectors.iter().map(|detector| detector.column_set.clone()).collect();
-    let count = column_sets.len();
-    let mut gram = Gram::new(columns, column_sets, model, residual, prior);
-    gram.take_draws(null, false, should_continue)?;
-    let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
-    let trained = TrainedModel::new(&gram, &[], &folds)?;
-    let mut best = (0, f64::NEG_INFINITY, 0.0);
-    for (index, gain) in trained.gains(&|_| true)?.iter().enumerate() {
-        if gain.freedom == 0 {
-            continue;
-        }
-        let score = -ln_chi_square_tail(gain.gain, gain.freedom);
-        if score > best.1 {
-            best = (index, score, gain.gain - gain.freedom as f64);
-        }
-    }
-    let null_best = trained.null_best(&[], &vec![0.0; count], 1.0)?;
-    let above = null_best.iter().filter(|score| **score >= best.1).count();
+    };
+    let above = null_best.iter().filter(|null| **null >= score).count();
     let p_value = (above + 1) as f64 / (null_best.len() + 1) as f64;
-    let size_um = (2.0 * best.2.max(0.0) / columns.rows().max(1) as f64).sqrt() * problem.noise.sigma_mm * 1e3;
-    let description =
-        format!("{} ({} over all readings)", detectors[best.0].description, problem.unit().text(size_um, 2));
-    Ok(Structure { p_value, excess: best.2.max(0.0), description })
+    let size_um = (2.0 * excess.max(0.0) / columns.rows().max(1) as f64).sqrt() * problem.noise.sigma_mm * 1e3;
+    let description = format!("{} ({} over all readings)", detector.description, problem.unit().text(size_um, 2));
+    Ok(Structure { p_value, excess: excess.max(0.0), description })
 }
 
 #[cfg(test)]

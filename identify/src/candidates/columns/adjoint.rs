@@ -82,11 +82,11 @@ impl Columns<'_> {
 }
 
 /// `Wᵀ z` of several vectors.
-pub struct Adjoint {
+pub struct Adjoint<T = f64> {
     /// The test and the scalar reading of each row, in ascending order.
-    pub rows: Vec<(u32, u32)>,
+    pub rows: Arc<Vec<(u32, u32)>>,
     /// Vectors × rows.
-    pub values: Mat<f64>,
+    pub values: Mat<T>,
 }
 
 impl Adjoint {
@@ -116,6 +116,6 @@ impl Adjoint {
                 }
             }
         }
-        Adjoint { rows, values }
+        Adjoint { rows: Arc::new(rows), values }
     }
 }

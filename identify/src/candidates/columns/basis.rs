@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
-use abbe_model::driver::{Driver, DriverInput, DriverPart, DriverSample};
+use abbe_model::driver::{Driver, DriverInput, DriverPart};
 use abbe_model::effect::shape::Curve;
 use abbe_model::effect::{Component, Effect, Shape};
 use faer::Mat;
@@ -22,8 +22,9 @@ pub struct EffectColumns {
     pub numbers: usize,
     /// What moves the readings, and what it follows.
     pub channel: Arc<Channel>,
-    /// The basis functions: states × columns.
-    pub basis: Arc<Mat<f64>>,
+    /// The basis functions: states × columns. Those of the library are the largest arrays of a trace. Single precision halves
+    /// them; they rank candidates, and the fit computes an effect that is found in double precision.
+    pub basis: Arc<Mat<f32>>,
 }
 
 impl EffectColumns {
@@ -35,16 +36,14 @@ impl EffectColumns {
     /// The largest absolute value of its basis functions.
     pub fn greatest(&self) -> f64 {
         let columns = self.basis.col_iter().flat_map(|column| column.iter());
-        self.channel.greatest_factor * columns.fold(0.0_f64, |a, b| a.max(b.abs()))
+        self.channel.greatest_factor * f64::from(columns.fold(0.0_f32, |a, b| a.max(b.abs())))
     }
 }
 
-/// The basis functions of a shape at some samples: samples × coefficients.
-fn basis_of(shape: &Shape, samples: &[DriverSample<f64>]) -> Arc<Mat<f64>> {
-    let columns = shape.columns(samples);
-    let mut basis = Mat::zeros(samples.len(), columns.len());
-    columns.iter().enumerate().for_each(|(k, column)| basis.col_as_slice_mut(k).copy_from_slice(column));
-    Arc::new(basis)
+/// Columns of equal length as a matrix in single precision.
+fn single(columns: &[Vec<f64>]) -> Arc<Mat<f32>> {
+    let rows = columns.first().map_or(0, Vec::len);
+    Arc::new(Mat::from_fn(rows, columns.len(), |i, k| columns[k][i] as f32))
 }
 
 impl Columns<'_> {
@@ -55,7 +54,7 @@ impl Columns<'_> {
         }
         let channel = self.channel(effect)?;
         let key = (Arc::as_ptr(&channel.states) as usize, format!("{:?}", effect.shape));
-        let basis = cached(&self.bases, key, || self.basis(&effect.shape, &channel));
+        let basis = cached(&self.bases, key, || single(&self.basis(&effect.shape, &channel)));
         Some(EffectColumns { count: effect.shape.coefficients(), numbers: effect.shape.numbers(), channel, basis })
     }
 
@@ -87,36 +86,36 @@ impl Columns<'_> {
             let states = Arc::new(DriverStates::of_scalars(&samples, &channels));
             Some(Arc::new(Channel { sensitivity: total, states, greatest_factor: 1.0, lagging: None }))
         })?;
-        let mut basis = Mat::zeros(channel.states.samples.len(), effect.shape.coefficients());
+        let mut basis = vec![vec![0.0; channel.states.samples.len()]; effect.shape.coefficients()];
         let of_parts: Vec<Vec<Vec<f64>>> =
             parts.iter().map(|part| part.columns(effect.shape.columns(&channel.states.samples))).collect();
         let mut state = 0;
         for (test, total) in channel.sensitivity.iter().enumerate() {
             for (scalar, total) in total.iter().enumerate().filter(|_| channel.states.acts_in(test)) {
-                for k in 0..basis.ncols() {
+                for (k, column) in basis.iter_mut().enumerate() {
                     let of_part = |part: usize| sensitivity(part, test, scalar) * of_parts[part][k][state];
                     let sum: f64 = (0..parts.len()).map(of_part).sum();
-                    basis[(state, k)] = if *total > 0.0 { sum / total } else { 0.0 };
+                    column[state] = if *total > 0.0 { sum / total } else { 0.0 };
                 }
                 state += 1;
             }
         }
         let (count, numbers) = (effect.shape.coefficients(), effect.shape.numbers());
-        Some(EffectColumns { count, numbers, channel, basis: Arc::new(basis) })
+        Some(EffectColumns { count, numbers, channel, basis: single(&basis) })
     }
 
     /// The columns of an effect on the channel of another, which differs from it in the shape numbers alone.
     pub fn reshaped(&self, shape: &Shape, channel: &Arc<Channel>) -> EffectColumns {
-        let basis = self.basis(shape, channel);
+        let basis = single(&self.basis(shape, channel));
         EffectColumns { count: shape.coefficients(), numbers: shape.numbers(), channel: Arc::clone(channel), basis }
     }
 
-    /// The basis functions of a shape at the states of a channel.
-    fn basis(&self, shape: &Shape, channel: &Channel) -> Arc<Mat<f64>> {
-        let Some(driver) = &channel.lagging else { return basis_of(shape, &channel.states.samples) };
+    /// The basis functions of a shape at the states of a channel, one column for each coefficient.
+    pub fn basis(&self, shape: &Shape, channel: &Channel) -> Vec<Vec<f64>> {
+        let Some(driver) = &channel.lagging else { return shape.columns(&channel.states.samples) };
         let acting = (0..channel.sensitivity.len()).filter(|test| channel.acts_in(*test));
         let samples = acting.filter_map(|test| self.driver_samples(test, driver, None, shape.lag_s()));
-        basis_of(shape, &samples.flat_map(|of_test| of_test.to_vec()).collect::<Vec<_>>())
+        shape.columns(&samples.flat_map(|of_test| of_test.to_vec()).collect::<Vec<_>>())
     }
 
     /// The channel of an effect. `None` if the data lack its driver.

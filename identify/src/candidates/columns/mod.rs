@@ -51,7 +51,7 @@ pub struct Columns<'p> {
     /// The channels, by component, driver and tests. `None` if the data lack the driver.
     channels: Mutex<HashMap<String, Option<Arc<Channel>>>>,
     /// The basis functions of each shape, by the address of the states and the shape.
-    bases: Mutex<HashMap<(usize, String), Arc<Mat<f64>>>>,
+    bases: Mutex<HashMap<(usize, String), Arc<Mat<f32>>>>,
 }
 
 /// The change of each scalar reading per unit of a component, by test, and the largest factor of a sensitivity in it.
@@ -126,7 +126,7 @@ impl<'p> Columns<'p> {
                     let basis = column_set.basis.col_as_slice(k);
                     let entries = raw.col_as_slice_mut(column + k).iter_mut().zip(sensitivity).enumerate();
                     let state = |i: usize| states.of_scalar(block.test, first + i, channels);
-                    entries.for_each(|(i, (entry, s))| *entry = s * basis[state(i)]);
+                    entries.for_each(|(i, (entry, s))| *entry = s * f64::from(basis[state(i)]));
                 }
             }
             column += column_set.count;

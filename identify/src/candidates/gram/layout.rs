@@ -29,6 +29,10 @@ const CHUNKS_PER_TASK: usize = 12;
 const STATES_AT_ONCE: usize = 256;
 /// Largest number of vectors of one task over all its channels, if it has more than one channel.
 const MAX_VECTORS: usize = 512;
+/// Smallest number of states of a task, if it has not all. With more, a long session has enough tasks for all processors.
+const MIN_STATES_PER_TASK: usize = 4096;
+/// Largest number of tasks among which the states are shared. Each holds the sums of its columns.
+const MAX_PIECES: usize = 8;
 
 /// The candidates of a segment by states, basis and channel.
 pub(super) struct Layout {
@@ -48,7 +52,7 @@ struct Group {
 
 /// Basis functions and the effects that have them: channel in the group, candidate in the segment.
 struct Member {
-    basis: Arc<Mat<f64>>,
+    basis: Arc<Mat<f32>>,
     users: Vec<(usize, usize)>,
 }
 
@@ -65,6 +69,23 @@ struct Task {
     group: usize,
     channels: Range<usize>,
     chunks: Range<usize>,
+    work: Work,
+}
+
+/// What a task forms.
+enum Work {
+    /// The products with the vectors, summed over some states.
+    Sums(Range<usize>),
+    /// The products of each candidate with itself.
+    Squares,
+}
+
+/// What a task has formed.
+enum Formed {
+    /// Vectors of each channel × columns.
+    Sums(Mat<f64>),
+    /// Square after square.
+    Squares(Vec<f64>),
 }
 
 impl Layout {
@@ -133,10 +154,10 @@ impl Layout {
 
     /// The products of all columns with some vectors and, if `with_own`, of each candidate with itself, over some
     /// whitened rows. `None` if `should_continue` returns `false`.
-    pub fn products(
+    pub fn products<T: Copy + Into<f64> + Sync>(
         &self,
         training: &TrainingRows,
-        side: &Adjoint,
+        side: &Adjoint<T>,
         with_own: bool,
         should_continue: &(dyn Fn() -> bool + Sync),
     ) -> Option<Products> {
@@ -148,51 +169,72 @@ impl Layout {
             let at_once = (MAX_VECTORS / vectors.max(1)).max(1);
             for first in (0..group.channels.len()).step_by(at_once) {
                 for chunk in (0..group.chunks.len()).step_by(CHUNKS_PER_TASK) {
-                    tasks.push(Task {
+                    let task = |work: Work| Task {
                         group: number,
                         channels: first..(first + at_once).min(group.channels.len()),
                         chunks: chunk..(chunk + CHUNKS_PER_TASK).min(group.chunks.len()),
-                    });
+                        work,
+                    };
+                    let states = local[number].count();
+                    let piece = states.div_ceil(MAX_PIECES).max(MIN_STATES_PER_TASK);
+                    let pieces = (0..states).step_by(piece).map(|first| first..(first + piece).min(states));
+                    tasks.extend(pieces.map(|states| task(Work::Sums(states))));
+                    if with_own {
+                        tasks.push(task(Work::Squares));
+                    }
                 }
             }
         }
         let results = parallel::map(tasks.len(), &|k| {
-            should_continue().then(|| self.products_of(&tasks[k], &local[tasks[k].group], training, side, with_own))
+            should_continue().then(|| {
+                let local = &local[tasks[k].group];
+                match &tasks[k].work {
+                    Work::Sums(states) => Formed::Sums(self.sums_of(&tasks[k], local, states, side)),
+                    Work::Squares => Formed::Squares(self.squares_of(&tasks[k], local, training)),
+                }
+            })
         });
         let mut products = Products {
             side: Mat::zeros(vectors, self.total()),
             own: vec![0.0; if with_own { self.square[self.square.len() - 1] } else { 0 }],
         };
         for (task, result) in tasks.iter().zip(results) {
-            let (sums, own) = result?;
-            let mut own = own.into_iter();
-            let mut column = 0;
-            for member in self.groups[task.group].chunks[task.chunks.clone()].iter().flatten() {
-                for (channel, candidate) in member.users_of(&task.channels) {
-                    let first = (channel - task.channels.start) * vectors;
-                    for (k, to) in self.columns(candidate).enumerate() {
-                        let from = &sums.col_as_slice(column + k)[first..first + vectors];
-                        products.side.col_as_slice_mut(to).copy_from_slice(from);
-                    }
-                    if with_own {
-                        products.own[self.squares(candidate)].iter_mut().zip(&mut own).for_each(|(to, own)| *to = own);
+            let members = self.groups[task.group].chunks[task.chunks.clone()].iter().flatten();
+            match result? {
+                Formed::Sums(sums) => {
+                    let mut column = 0;
+                    for member in members {
+                        for (channel, candidate) in member.users_of(&task.channels) {
+                            let first = (channel - task.channels.start) * vectors;
+                            for (k, to) in self.columns(candidate).enumerate() {
+                                let from = &sums.col_as_slice(column + k)[first..first + vectors];
+                                let to = products.side.col_as_slice_mut(to);
+                                to.iter_mut().zip(from).for_each(|(to, from)| *to += from);
+                            }
+                        }
+                        column += member.basis.ncols();
                     }
                 }
-                column += member.basis.ncols();
+                Formed::Squares(squares) => {
+                    let mut squares = squares.into_iter();
+                    for (_, candidate) in members.flat_map(|member| member.users_of(&task.channels)) {
+                        let to = products.own[self.squares(candidate)].iter_mut();
+                        to.zip(&mut squares).for_each(|(to, square)| *to = square);
+                    }
+                }
             }
         }
         Some(products)
     }
 
-    /// The sums of a task (vectors of each channel × columns) and the squares of its candidates.
-    fn products_of(
+    /// The products of the columns of a task with the vectors over some states: vectors of each channel × columns.
+    fn sums_of<T: Copy + Into<f64>>(
         &self,
         task: &Task,
         local: &LocalStates,
-        training: &TrainingRows,
-        side: &Adjoint,
-        with_own: bool,
-    ) -> (Mat<f64>, Vec<f64>) {
+        states: &Range<usize>,
+        side: &Adjoint<T>,
+    ) -> Mat<f64> {
         let group = &self.groups[task.group];
         let vectors = side.values.nrows();
         let channels = &group.channels[task.channels.clone()];
@@ -200,11 +242,11 @@ impl Layout {
         let widths: Vec<usize> =
             chunks.iter().map(|chunk| chunk.iter().map(|member| member.basis.ncols()).sum()).collect();
         let mut sums = Mat::zeros(vectors * channels.len(), widths.iter().sum());
-        let at_once = STATES_AT_ONCE.min(local.count());
+        let at_once = STATES_AT_ONCE.min(states.len());
         let mut gathered = Mat::zeros(sums.nrows(), at_once);
         let mut basis = Mat::zeros(at_once, widths.iter().copied().max().unwrap_or(0));
-        for first in (0..local.count()).step_by(at_once.max(1)) {
-            let states = first..(first + at_once).min(local.count());
+        for first in states.clone().step_by(at_once.max(1)) {
+            let states = first..(first + at_once).min(states.end);
             local.gather(states.clone(), channels, side, gathered.as_mut().subcols_mut(0, states.len()));
             let gathered = gathered.as_ref().subcols(0, states.len());
             let mut column = 0;
@@ -220,27 +262,29 @@ impl Layout {
                 column += width;
             }
         }
+        sums
+    }
+
+    /// The products with themselves of the candidates of a task.
+    fn squares_of(&self, task: &Task, local: &LocalStates, training: &TrainingRows) -> Vec<f64> {
+        let group = &self.groups[task.group];
+        let channels = &group.channels[task.channels.clone()];
+        let own: Vec<OwnProducts<'_>> =
+            channels.iter().map(|channel| OwnProducts::of(channel, local, training)).collect();
         let mut squares = Vec::new();
-        if with_own {
-            let own: Vec<OwnProducts<'_>> =
-                channels.iter().map(|channel| OwnProducts::of(channel, local, training)).collect();
-            let mut basis = Mat::zeros(0, 0);
-            for member in chunks.iter().flatten() {
-                let count = member.basis.ncols();
-                basis.resize_with(local.count(), basis.ncols().max(count), |_, _| 0.0);
-                for k in 0..count {
-                    local.copy(0..local.count(), member.basis.col_as_slice(k), basis.col_as_slice_mut(k));
-                }
-                for (channel, _) in member.users_of(&task.channels) {
-                    own[channel - task.channels.start].append(
-                        basis.as_ref().subcols(0, count),
-                        &member.basis,
-                        &mut squares,
-                    );
-                }
+        let mut basis = Mat::zeros(0, 0);
+        for member in group.chunks[task.chunks.clone()].iter().flatten() {
+            let count = member.basis.ncols();
+            basis.resize_with(local.count(), basis.ncols().max(count), |_, _| 0.0);
+            for k in 0..count {
+                local.copy(0..local.count(), member.basis.col_as_slice(k), basis.col_as_slice_mut(k));
+            }
+            for (channel, _) in member.users_of(&task.channels) {
+                let own = &own[channel - task.channels.start];
+                own.append(basis.as_ref().subcols(0, count), &member.basis, &mut squares);
             }
         }
-        (sums, squares)
+        squares
     }
 }
 

@@ -34,8 +34,10 @@ use layout::Layout;
 pub(super) use projection::{ChosenEffect, Projection, SegmentProducts};
 pub(super) use tuning::{ChannelProducts, TuningSide};
 
-/// Null draws that are projected together.
+/// Null draws whose products are formed together.
 const DRAWS_AT_ONCE: usize = 32;
+/// Null draws from which the model is projected out together. Each is held in double precision.
+const PROJECTED_AT_ONCE: usize = 8;
 /// Largest number of entries of the null draws whose products are formed together, if they are more than one part.
 const MAX_NULL_ENTRIES: usize = 1_000_000;
 
@@ -78,15 +80,9 @@ pub struct Gram<'c> {
     projections: Store<Vec<usize>, Projection>,
 }
 
-/// The null draws with the model projected out, as [`Adjoint`]. They are the largest array of a trace. Single precision
-/// halves it; scores are compared with each other, and a rounding of 10⁻⁷ decides nothing.
-#[derive(Default)]
-struct NullDraws {
-    /// The test and the scalar reading of each row.
-    rows: Vec<(u32, u32)>,
-    /// Some draws × rows, one part after another.
-    parts: Vec<Mat<f32>>,
-}
+/// Null draws with the model projected out: some draws, one part after another. They are the largest array of a trace of few
+/// driver states. Single precision halves it; scores are compared with each other, and a rounding of 10⁻⁷ decides nothing.
+type NullDraws = Vec<Adjoint<f32>>;
 
 /// Values that clones share.
 type Store<K, V> = Arc<Mutex<HashMap<K, Arc<V>>>>;
@@ -146,7 +142,7 @@ impl<'c> Gram<'c> {
     /// If products are not finite, or [`IdentifyError::Interrupted`] if `should_continue` returns `false`.
     pub fn take_draws(
         &mut self,
-        mut draws: impl ExactSizeIterator<Item = Vec<f64>>,
+        mut draws: impl ExactSizeIterator<Item = Vec<f64>> + Send,
         kept: bool,
         should_continue: &(dyn Fn() -> bool + Sync),
     ) -> Result<(), IdentifyError> {
@@ -155,18 +151,24 @@ impl<'c> Gram<'c> {
         // Whole parts: a column of fewer draws is padded to a multiple of 64 bytes.
         let at_once = DRAWS_AT_ONCE * (MAX_NULL_ENTRIES / (DRAWS_AT_ONCE * self.residual.len().max(1))).max(1);
         let mut products = Mat::zeros(count, layout.total());
-        let mut null = NullDraws::default();
+        let mut null = NullDraws::new();
+        let mut next: Vec<Vec<f64>> = draws.by_ref().take(at_once).collect();
         for first in (0..count).step_by(at_once) {
-            let part: Vec<Vec<f64>> = draws.by_ref().take(at_once).collect();
-            let mut side = self.projected(&whole, &part);
-            drop(part);
-            let formed =
-                layout.products(&whole.training, &side, false, should_continue).ok_or(IdentifyError::Interrupted)?;
+            let part = std::mem::take(&mut next);
+            let formed = || {
+                let side = self.projected(&whole, part);
+                let formed = layout.products(&whole.training, &side, false, should_continue);
+                formed.map(|formed| (side, formed))
+            };
+            // Draws are formed one after the other: the next ones beside the products of these.
+            let formed = parallel::both(formed, || next = draws.by_ref().take(at_once).collect()).0;
+            let (mut side, formed) = formed.ok_or(IdentifyError::Interrupted)?;
             products.as_mut().subrows_mut(first, formed.side.nrows()).copy_from(&formed.side);
             if kept {
-                let values = &side.values;
-                null.parts.push(Mat::from_fn(values.nrows(), values.ncols(), |i, j| values[(i, j)] as f32));
-                null.rows = std::mem::take(&mut side.rows);
+                if let Some(first) = null.first() {
+                    side.rows = Arc::clone(&first.rows);
+                }
+                null.push(side);
             }
         }
         (self.draws, self.null) = (count, Arc::new(null));
@@ -174,24 +176,26 @@ impl<'c> Gram<'c> {
     }
 
     /// Null draws with the model projected out.
-    fn projected(&self, whole: &Projection, draws: &[Vec<f64>]) -> Adjoint {
-        let parts: Vec<&[Vec<f64>]> = draws.chunks(DRAWS_AT_ONCE).collect();
+    fn projected(&self, whole: &Projection, draws: Vec<Vec<f64>>) -> Adjoint<f32> {
+        let parts: Vec<&[Vec<f64>]> = draws.chunks(PROJECTED_AT_ONCE).collect();
         let projected = parallel::map(parts.len(), &|k| {
             let mut part = Mat::from_fn(self.residual.len(), parts[k].len(), |i, draw| parts[k][draw][i]);
             let along = &whole.inverse * transposed_product(self.model(), part.as_ref());
             matmul(part.as_mut(), Accum::Add, self.model(), along.as_ref(), -1.0, Par::Seq);
             Adjoint::of(&whole.training, part.as_ref())
         });
-        let mut all = Adjoint { rows: Vec::new(), values: Mat::zeros(0, 0) };
+        let rows = projected.first().map(|part| Arc::clone(&part.rows)).unwrap_or_default();
+        let mut values = Mat::zeros(draws.len(), rows.len());
         let mut first = 0;
-        for Adjoint { rows, values } in projected {
-            if first == 0 {
-                all = Adjoint { values: Mat::zeros(draws.len(), rows.len()), rows };
+        for part in projected {
+            for (to, from) in
+                values.as_mut().subrows_mut(first, part.values.nrows()).col_iter_mut().zip(part.values.col_iter())
+            {
+                to.iter_mut().zip(from.iter()).for_each(|(to, from)| *to = *from as f32);
             }
-            all.values.as_mut().subrows_mut(first, values.nrows()).copy_from(&values);
-            first += values.nrows();
+            first += part.values.nrows();
         }
-        all
+        Adjoint { rows, values }
     }
 
     /// Adds candidates as a segment of their own.
@@ -291,18 +295,16 @@ impl<'c> Gram<'c> {
     /// The products of a segment with the projected null draws: draws × columns.
     pub(super) fn null_products(&self, segment: usize) -> Result<Arc<Mat<f64>>, IdentifyError> {
         stored(&self.null_products, &self.segments[segment].key, || {
-            debug_assert!(self.draws == 0 || !self.null.parts.is_empty(), "the draws were not kept");
+            debug_assert!(self.draws == 0 || !self.null.is_empty(), "the draws were not kept");
             let whole = self.projection(&self.all_folds())?;
             let layout = &self.segments[segment].layout;
             let mut products = Mat::zeros(self.draws, layout.total());
-            let mut side = Adjoint { rows: self.null.rows.clone(), values: Mat::zeros(0, 0) };
             let mut first = 0;
-            for part in &self.null.parts {
-                side.values = Mat::from_fn(part.nrows(), part.ncols(), |i, j| f64::from(part[(i, j)]));
-                let formed = layout.products(&whole.training, &side, false, &|| true);
+            for part in self.null.iter() {
+                let formed = layout.products(&whole.training, part, false, &|| true);
                 let formed = formed.ok_or(IdentifyError::Interrupted)?.side;
-                products.as_mut().subrows_mut(first, part.nrows()).copy_from(&formed);
-                first += part.nrows();
+                products.as_mut().subrows_mut(first, formed.nrows()).copy_from(&formed);
+                first += formed.nrows();
             }
             Ok(Arc::new(products))
         })

@@ -79,20 +79,26 @@ impl LocalStates {
     }
 
     /// Copies the entries of a basis function at some of these states.
-    pub fn copy(&self, states: Range<usize>, from: &[f64], to: &mut [f64]) {
+    pub fn copy<T: Copy + Into<f64>>(&self, states: Range<usize>, from: &[T], to: &mut [f64]) {
         // Mostly all states occur, and every piece of them is a piece of the basis function.
         if let [first, .., last] = self.states[states.clone()]
             && (last - first) as usize + 1 == states.len()
         {
-            to[..states.len()].copy_from_slice(&from[first as usize..=last as usize]);
+            to.iter_mut().zip(&from[first as usize..=last as usize]).for_each(|(to, from)| *to = (*from).into());
             return;
         }
-        to.iter_mut().zip(&self.states[states]).for_each(|(to, state)| *to = from[*state as usize]);
+        to.iter_mut().zip(&self.states[states]).for_each(|(to, state)| *to = from[*state as usize].into());
     }
 
     /// Sums `s · z` of some channels over the readings of each of some states: vectors of one channel after another ×
     /// states.
-    pub fn gather(&self, states: Range<usize>, channels: &[Arc<Channel>], side: &Adjoint, mut sums: MatMut<'_, f64>) {
+    pub fn gather<T: Copy + Into<f64>>(
+        &self,
+        states: Range<usize>,
+        channels: &[Arc<Channel>],
+        side: &Adjoint<T>,
+        mut sums: MatMut<'_, f64>,
+    ) {
         let vectors = side.values.nrows();
         sums.fill(0.0);
         for (state, to) in states.zip(sums.col_iter_mut()) {
@@ -104,7 +110,7 @@ impl LocalStates {
                 let values = side.values.col_as_slice(*row as usize);
                 for (channel, to) in channels.iter().zip(to.chunks_exact_mut(vectors.max(1))) {
                     let sensitivity = channel.sensitivity[test as usize][scalar as usize];
-                    to.iter_mut().zip(values).for_each(|(sum, value)| *sum += sensitivity * value);
+                    to.iter_mut().zip(values).for_each(|(sum, value)| *sum += sensitivity * (*value).into());
                 }
             }
         }
@@ -155,7 +161,7 @@ impl<'r> OwnProducts<'r> {
     }
 
     /// Appends the square of the products of some columns: `local` at the states of these rows, `basis` at all states.
-    pub fn append(&self, local: MatRef<'_, f64>, basis: &Mat<f64>, squares: &mut Vec<f64>) {
+    pub fn append<T: Copy + Into<f64>>(&self, local: MatRef<'_, f64>, basis: &Mat<T>, squares: &mut Vec<f64>) {
         let count = local.ncols();
         let column = |k: usize| local.col(k).try_as_col_major().map_or(&[][..], |column| column.as_slice());
         if self.band.is_empty() && self.states > 0 {
@@ -214,7 +220,7 @@ impl<'r> OwnProducts<'r> {
     }
 
     /// The whitened columns of some basis functions.
-    fn rows(&self, basis: &Mat<f64>) -> Mat<f64> {
+    fn rows<T: Copy + Into<f64>>(&self, basis: &Mat<T>) -> Mat<f64> {
         let training = self.training;
         let rows: usize = training.blocks.iter().map(|block| block.count()).sum();
         let mut columns = Mat::zeros(rows, basis.ncols());
@@ -229,7 +235,8 @@ impl<'r> OwnProducts<'r> {
                     if acts {
                         let term = |(raw, factor): (usize, f64)| {
                             let scalar = block.start + raw;
-                            factor * sensitivity[scalar] * basis[states.of_scalar(block.test, scalar, channels)]
+                            let value: f64 = basis[states.of_scalar(block.test, scalar, channels)].into();
+                            factor * sensitivity[scalar] * value
                         };
                         *value = training.filter.terms(i).map(term).sum();
                     }
