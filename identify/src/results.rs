@@ -29,7 +29,7 @@ pub use outcome::{
     Assumption, AssumptionKind, AssumptionVerdict, DataRange, DeterminedByPrior, Goodness, GoodnessVerdict,
     NotEstimated, Outcome, TraceVerdict,
 };
-pub(crate) use parameter::phases_follow_amplitudes;
+pub(crate) use parameter::{COVERAGE_FACTOR, phases_follow_amplitudes};
 pub use parameter::{
     Combination, Covariance, DeterminedBy, EnlargedBy, Interval, NullSpace, ParameterResult, Unobservable,
 };

@@ -81,34 +81,28 @@ const BIRGE_SIGNIFICANCE: f64 = 1e-3;
 /// The least-squares problem of a session, restricted to the identifiable directions.
 struct IdentifiableDirections<'p> {
     problem: &'p Problem,
-    basis: &'p Mat<f64>,
+    rank: &'p Rank,
     /// The last linearisation: the parameters, and the triangular factors of the folds at these values.
     last: RefCell<(Vec<f64>, Vec<Triangle>)>,
 }
 
-impl IdentifiableDirections<'_> {
-    fn beta(&self, z: &[f64]) -> Vec<f64> {
-        (0..self.basis.nrows()).map(|j| (0..z.len()).map(|k| self.basis[(j, k)] * z[k]).sum()).collect()
-    }
-}
-
 impl LeastSquares for IdentifiableDirections<'_> {
     fn parameters(&self) -> usize {
-        self.basis.ncols()
+        self.rank.identifiable_basis.ncols()
     }
 
     fn linearise(&self, z: &[f64]) -> Result<Triangle, IdentifyError> {
-        let beta = self.beta(z);
+        let beta = self.rank.parameters_at(z);
         if self.last.borrow().0 != beta {
             let triangles = self.problem.triangles(&beta)?;
             self.last.replace((beta, triangles));
         }
         let (beta, triangles) = &*self.last.borrow();
-        Ok(self.problem.prior_triangle(beta).merged(triangles).in_directions(self.basis))
+        Ok(self.problem.prior_triangle(beta).merged(triangles).in_directions(&self.rank.identifiable_basis))
     }
 
     fn sum_of_squares(&self, z: &[f64]) -> f64 {
-        self.problem.sum_of_squares(&self.beta(z))
+        self.problem.sum_of_squares(&self.rank.parameters_at(z))
     }
 }
 
@@ -137,9 +131,7 @@ pub(crate) struct Linearisation {
 pub(crate) fn linearised(problem: &Problem, beta: Vec<f64>, near: Linearisation) -> Result<Fit, IdentifyError> {
     let (rank, _) = rank_at_nominal(problem)?;
     let coordinates = rank.coordinates(&beta, &problem.parameters.sizes());
-    let basis = &rank.identifiable_basis;
-    let beta: Vec<f64> =
-        (0..beta.len()).map(|j| (0..basis.ncols()).map(|k| basis[(j, k)] * coordinates[k]).sum()).collect();
+    let beta = rank.parameters_at(&coordinates);
     let step: Vec<f64> = beta.iter().zip(&near.beta).map(|(end, start)| end - start).collect();
     let factor = near.noise_mm / problem.noise.likelihood_mm();
     let triangles = near.triangles.iter().map(|triangle| triangle.after(&step).scaled(factor)).collect();
@@ -162,7 +154,7 @@ pub(crate) struct Minimum {
 /// If the model cannot be evaluated, or the iterations do not converge.
 pub(crate) fn minimum(problem: &Problem, start: Option<&[f64]>) -> Result<Minimum, IdentifyError> {
     let (rank, last) = rank_at_nominal(problem)?;
-    let restricted = IdentifiableDirections { problem, basis: &rank.identifiable_basis, last: RefCell::new(last) };
+    let restricted = IdentifiableDirections { problem, rank: &rank, last: RefCell::new(last) };
     let mut end = None;
     if rank.identifiable_basis.ncols() > 0 {
         let scale = Scaling::Physical(vec![1.0; rank.identifiable_basis.ncols()]);
@@ -170,7 +162,7 @@ pub(crate) fn minimum(problem: &Problem, start: Option<&[f64]>) -> Result<Minimu
             || vec![0.0; rank.identifiable_basis.ncols()],
             |beta| rank.coordinates(beta, &problem.parameters.sizes()),
         );
-        end = Some(restricted.beta(&minimise(&restricted, &from, &scale)?.x));
+        end = Some(rank.parameters_at(&minimise(&restricted, &from, &scale)?.x));
     }
     let (last, triangles) = restricted.last.into_inner();
     let beta = end.unwrap_or_else(|| last.clone());

@@ -99,6 +99,12 @@ impl Rank {
             .collect()
     }
 
+    /// The parameters at some coordinates in the identifiable basis. Internal units.
+    pub fn parameters_at(&self, coordinates: &[f64]) -> Vec<f64> {
+        let basis = &self.identifiable_basis;
+        (0..basis.nrows()).map(|j| coordinates.iter().enumerate().map(|(k, z)| basis[(j, k)] * z).sum()).collect()
+    }
+
     /// Whether a parameter takes part in no null-space combination.
     pub fn is_identifiable(&self, parameter: usize) -> bool {
         self.null_combinations.iter().all(|row| row[parameter] == 0.0)

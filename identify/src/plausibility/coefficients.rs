@@ -6,11 +6,10 @@
 use crate::fit::Fit;
 use crate::parameters::{Role, physical_size};
 use crate::problem::Problem;
+use crate::results::COVERAGE_FACTOR;
 
 /// Largest coefficient, in physical sizes of its component: 100 mm, 1 rad.
 const MAX_SIZES: f64 = 100.0;
-/// Coverage factor of the expanded uncertainty.
-const COVERAGE_FACTOR: f64 = 2.0;
 
 /// One warning for each effect with a coefficient that is larger than [`MAX_SIZES`] by more than its expanded uncertainty.
 pub(crate) fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {

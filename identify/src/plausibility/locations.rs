@@ -13,6 +13,7 @@ use super::results::{Conflict, ConflictKind};
 use crate::fit::Fit;
 use crate::parameters::Role;
 use crate::problem::Problem;
+use crate::results::COVERAGE_FACTOR;
 
 /// Largest share of a link by which an axis may lie beside its place; for angles, in radians.
 const MAX_SHARE: f64 = 0.05;
@@ -23,8 +24,6 @@ const MAX_ZERO: f64 = 10.0 * std::f64::consts::PI / 180.0;
 const ALONG: f64 = 0.9;
 /// Axes that are nearer than this meet, mm.
 const MEET_MM: f64 = 1.0;
-/// Coverage factor of the expanded uncertainty.
-const COVERAGE_FACTOR: f64 = 2.0;
 
 /// The location errors above 5 % of their link and the zeros of joints above 10°, the largest against its limit first.
 pub(super) fn conflicts(problem: &Problem, fit: &Fit) -> Vec<Conflict> {

@@ -101,7 +101,10 @@ pub(crate) fn checked(problem: &Problem, fit: Result<Fit, IdentifyError>) -> Res
             problem.noise.sigma_mm * 1e3,
             problem.unit().symbol()
         ),
-        Err(error @ IdentifyError::NoConvergence { .. }) => error.to_string(),
+        // The diagnosis takes the place of the advice of this error.
+        Err(IdentifyError::NoConvergence { iterations, sum_of_squares }) => {
+            format!("no convergence after {iterations} iterations (the sum of squares is {sum_of_squares:.3e})")
+        }
         Err(error) => return Err(error),
     };
     let suggestions = if problem.session.instruments().iter().any(|kind| kind.is_two_sided()) {

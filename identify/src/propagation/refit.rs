@@ -75,11 +75,6 @@ impl<'p> Refit<'p> {
         })
     }
 
-    fn beta(&self, z: &[f64]) -> Vec<f64> {
-        let basis = &self.fit.rank.identifiable_basis;
-        (0..basis.nrows()).map(|j| (0..z.len()).map(|k| basis[(j, k)] * z[k]).sum()).collect()
-    }
-
     /// The identifiable coordinates with the best fit to the inputs.
     fn fitted(&self, deviations: &[f64]) -> Result<Vec<f64>, IdentifyError> {
         let drawn = SimulatedFit { refit: self, deviations };
@@ -131,7 +126,7 @@ impl Function for Refit<'_> {
                 *output = value;
             }
         };
-        values_at(self.problem, self.fit, &self.quantities, &self.beta(&z), put);
+        values_at(self.problem, self.fit, &self.quantities, &self.fit.rank.parameters_at(&z), put);
     }
 }
 
@@ -167,7 +162,7 @@ impl SimulatedFit<'_, '_> {
 
     /// `Nᵀ Jᵀ V⁻¹ r`: the negative gradient of half the sum of squares.
     fn descent(&self, z: &[f64]) -> Result<Vec<f64>, IdentifyError> {
-        let beta = self.refit.beta(z);
+        let beta = self.refit.fit.rank.parameters_at(z);
         let count = beta.len();
         let mut whole = vec![0.0; count];
         let mut add = |own: &[usize], rows: &Mat<f64>| {
@@ -192,7 +187,7 @@ impl LeastSquares for SimulatedFit<'_, '_> {
     }
 
     fn linearise(&self, z: &[f64]) -> Result<Triangle, IdentifyError> {
-        let beta = self.refit.beta(z);
+        let beta = self.refit.fit.rank.parameters_at(z);
         let mut whole = self.prior_triangle(&beta);
         self.rows(&beta, |own, rows| {
             let mut narrow = Triangle::new(own.len());
@@ -207,7 +202,7 @@ impl LeastSquares for SimulatedFit<'_, '_> {
 
     fn sum_of_squares(&self, z: &[f64]) -> f64 {
         let refit = self.refit;
-        let beta = refit.beta(z);
+        let beta = refit.fit.rank.parameters_at(z);
         let problem = refit.problem;
         let values = problem.slot_values(&beta);
         let mut sum = 0.0;

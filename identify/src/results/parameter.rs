@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, Serializer};
 
 /// Coverage factor of the expanded uncertainty `U = k u` (JCGM 100, 6.2).
-const COVERAGE_FACTOR: f64 = 2.0;
+pub(crate) const COVERAGE_FACTOR: f64 = 2.0;
 
 /// What determines the estimate of a parameter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
