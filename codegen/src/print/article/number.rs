@@ -10,8 +10,10 @@ use crate::tree::{Tree, binary, negative, product};
 
 /// Largest denominator that is shorter than the decimals.
 const DENOMINATOR: u32 = 12;
-/// Largest numerator of a multiple of π.
-const NUMERATOR: f64 = 12.0;
+/// Largest numerator of a multiple of π, and of a fraction with a larger denominator.
+const NUMERATOR: u32 = 12;
+/// Largest denominator of a fraction with such a numerator: a polynomial over ±300 mm has the coefficient 1/300.
+const LARGEST_DENOMINATOR: f64 = 1e6;
 
 /// The expression with fractions, multiples of roots and multiples of π where its numbers are such.
 pub(crate) fn exact(tree: &Tree) -> Tree {
@@ -28,9 +30,12 @@ fn of(value: f64) -> Option<Tree> {
         return None;
     }
     if let Some((numerator, denominator)) = fraction(value / PI, 180, ROUNDING)
-        && numerator <= NUMERATOR
+        && numerator <= f64::from(NUMERATOR)
     {
         return Some(over(numerator, Some(Tree::Number(PI)), denominator));
+    }
+    if let Some((numerator, denominator)) = few_over_many(value) {
+        return Some(over(numerator, None, denominator));
     }
     let Exact { factor, root } = Exact::of(value)?;
     let (numerator, denominator) = (factor.numer().to_f64()?, factor.denom().to_u32()?);
@@ -40,8 +45,23 @@ fn of(value: f64) -> Option<Tree> {
     }
     // Decimals are shorter than 5/16, and 12.5 mm is no 25/2 mm.
     let is_short = matches!(denominator, 2 | 4) && value < 1.0;
-    let is_endless = [2, 5].iter().fold(denominator, |rest, prime| without(rest, *prime)) != 1;
-    (is_short || is_endless && denominator <= DENOMINATOR).then(|| over(numerator, None, denominator))
+    (is_short || is_endless(denominator) && denominator <= DENOMINATOR).then(|| over(numerator, None, denominator))
+}
+
+/// The fraction with a small numerator that a value is, if its decimals have no end.
+fn few_over_many(value: f64) -> Option<(f64, u32)> {
+    let in_lowest_terms = (1..=NUMERATOR).map(f64::from).find_map(|numerator| {
+        let exact = numerator / value;
+        let denominator = exact.round();
+        let is_whole = (exact - denominator).abs() <= ROUNDING * exact && denominator <= LARGEST_DENOMINATOR;
+        is_whole.then_some((numerator, denominator as u32))
+    });
+    in_lowest_terms.filter(|(_, denominator)| is_endless(*denominator))
+}
+
+/// Whether the decimals of a fraction with this denominator, in lowest terms, have no end.
+fn is_endless(denominator: u32) -> bool {
+    [2, 5].iter().fold(denominator, |rest, prime| without(rest, *prime)) > 1
 }
 
 /// The rest of a number after division by all powers of a prime.
@@ -91,7 +111,13 @@ mod tests {
             (1.0 / 3.0, "1/3"),
             (7.0 / 3.0, "7/3"),
             (5.0 / 12.0, "5/12"),
-            (1.0 / 13.0, "0.07692307692307693"),
+            (1.0 / 13.0, "1/13"),
+            (1.0 / 300.0, "1/300"),
+            (6.0 / 7.0 / 300.0, "1/350"),
+            (11.0 / 2100.0, "11/2100"),
+            (1.0 / 90000.0, "1/90000"),
+            (1.0 / 320.0, "0.003125"),
+            (13.0 / 1700.0, "0.007647058823529412"),
             (2.0, "2"),
             (12.5, "12.5"),
             (0.5_f64.sqrt(), "√2/2"),
