@@ -12,7 +12,7 @@ use crate::report::block::{Formula, Report};
 /// Width of a line in a page of two columns, mm.
 const COLUMN_MM: f64 = 84.0;
 
-/// Length of the LaTeX of all tests in first order, bytes, beyond which the first test is printed frame by frame instead.
+/// Length of the LaTeX of all tests in first order, bytes, beyond which one test is printed frame by frame instead.
 const LONGEST: usize = 40_000;
 
 /// The part.
@@ -27,33 +27,55 @@ pub fn part(study: &Study, two_column: bool) -> Result<Part, CodegenError> {
         nomenclature: true,
         ..Style::default()
     };
-    let first_order = Form { order: Order::First, arrangement: Arrangement::Single };
-    let made = session.tests.iter().map(|test| first_order.of(session, test)).collect::<Result<Vec<_>, _>>()?;
-    let checked = made.iter().map(|(equation, source)| check(equation, source)).collect::<Result<Vec<_>, _>>()?;
-    let tests: Vec<TestEquations<'_>> =
-        checked.iter().map(|equation| TestEquations { equation, first: equation }).collect();
-    let all = |word: &str, style: &Style| language(word)?.print_system(&tests, style);
-    let latex = all("latex", &style)?;
     let mut report = Report::new("Equations");
-    if latex.len() <= LONGEST {
+    if let Some(displayed) = in_first_order(session, &style)? {
         report.key(
             "The readings of each test in first order of the errors, from the kinematic chain. Each equation agrees with the \
              derivatives of the chain at random states. The derivatives of all readings at zero errors and the symbols follow.",
         );
-        report.key(displayed(latex, all("typst", &style)?, all("text", &Style::default())?));
+        report.key(displayed);
         return Ok(Part { subject: Subject::Equations, report });
     }
-    let [test, ..] = session.tests.as_slice() else { return Ok(Part { subject: Subject::Equations, report }) };
-    let (equation, source) = Form { order: Order::Exact, arrangement: Arrangement::Frames }.of(session, test)?;
-    let checked = check(&equation, &source)?;
-    let one = |word: &str, style: &Style| language(word)?.print(&checked, style);
-    report.key(format!(
-        "The readings of test {} from frame to frame of the kinematic chain, exact in the errors; in first order they fill \
-         pages. The equation agrees with the chain at random states.",
-        test.name
-    ));
-    report.key(displayed(one("latex", &style)?, one("typst", &style)?, one("text", &Style::default())?));
+    let by_frames = Form { order: Order::Exact, arrangement: Arrangement::Frames };
+    for test in &session.tests {
+        let (equation, source) = by_frames.of(session, test)?;
+        let checked = check(&equation, &source)?;
+        let one = |word: &str, style: &Style| language(word)?.print(&checked, style);
+        let latex = one("latex", &style)?;
+        // The orientation of a robot's flange has no form by frames.
+        if latex.len() > LONGEST {
+            continue;
+        }
+        report.key(format!(
+            "The readings of test {} from frame to frame of the kinematic chain, exact in the errors. The equation \
+             agrees with the chain at random states.",
+            test.name
+        ));
+        report.key(displayed(latex, one("typst", &style)?, one("text", &Style::default())?));
+        return Ok(Part { subject: Subject::Equations, report });
+    }
+    report.key("The equations of the tests fill pages. They are printed, and written as code, by abbe equation.");
     Ok(Part { subject: Subject::Equations, report })
+}
+
+/// The equations of all tests in first order. `None` if they fill pages, or if a reading is the root of what the instrument's
+/// unknowns change, as the distance from a station that is searched for is.
+fn in_first_order(session: &Session, style: &Style) -> Result<Option<Formula>, CodegenError> {
+    let form = Form { order: Order::First, arrangement: Arrangement::Single };
+    let made: Result<Vec<_>, _> = session.tests.iter().map(|test| form.of(session, test)).collect();
+    let made = match made {
+        Err(CodegenError::NoPolynomial { .. }) => return Ok(None),
+        made => made?,
+    };
+    let checked = made.iter().map(|(equation, source)| check(equation, source)).collect::<Result<Vec<_>, _>>()?;
+    let tests: Vec<TestEquations<'_>> =
+        checked.iter().map(|equation| TestEquations { equation, first: equation }).collect();
+    let all = |word: &str, style: &Style| language(word)?.print_system(&tests, style);
+    let latex = all("latex", style)?;
+    if latex.len() > LONGEST {
+        return Ok(None);
+    }
+    Ok(Some(displayed(latex, all("typst", style)?, all("text", &Style::default())?)))
 }
 
 fn displayed(latex: String, typst: String, text: String) -> Formula {

@@ -285,7 +285,7 @@ impl<'d> SessionPlots<'d> {
         let caption = match (is_deviation, columns) {
             (true, _) => "Observed minus nominal reading.",
             (false, [_]) => "",
-            (false, _) => "Before: red, dashed or large. After: blue.",
+            (false, _) => "Before: orange, dashed or large. After: blue.",
         };
         Figure::new(
             format!("{}-{}-over-{}", if is_deviation { "deviation" } else { "residual" }, test.name, axis.name),

@@ -12,7 +12,7 @@ use crate::suite::{abbe, ready};
 const LAYOUTS: [&[&str]; 4] =
     [&[], &["--class", "ieeetran", "--two-column"], &["--two-column"], &["--class", "ieeetran"]];
 
-/// The three methods of Jiang (2014), measured and planned sessions, R-test, probe; robots if their data are there.
+/// The three methods of Jiang (2014), measured and planned sessions, every instrument; robots if their data are there.
 fn sessions() -> Vec<(PathBuf, Option<PathBuf>)> {
     let names = [
         "hermle-c600u/chapter4.toml",
@@ -21,6 +21,11 @@ fn sessions() -> Vec<(PathBuf, Option<PathBuf>)> {
         "hermle-c600u/measured/session.toml",
         "r-test/measured/session.toml",
         "self-calibration/measured/session.toml",
+        "laser/session.toml",
+        "angle/session.toml",
+        "diagonals/session.toml",
+        "distance/session.toml",
+        "pose/session.toml",
     ];
     let mut sessions: Vec<_> = names.map(|name| (ready(name), None)).to_vec();
     sessions.extend(
