@@ -94,6 +94,19 @@ pub fn check(path: &Path) -> Result<(), Failure> {
     }
 }
 
+/// An error where the name of a page promises another format than HTML: said before the work.
+pub fn check_page(path: &Path) -> Result<(), Failure> {
+    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+    match extension.as_deref() {
+        Some(other) if !matches!(other, "html" | "htm") && !is_stream(path) => Err(Failure::Other(format!(
+            "{}: the page is HTML; name a file that ends in `.html`{}",
+            path.display(),
+            if other == "pdf" { ", which a browser prints as PDF" } else { "" }
+        ))),
+        _ => Ok(()),
+    }
+}
+
 /// The files that a command is to write, looked at before the work, so that nothing is lost by it.
 pub struct Outputs {
     files: Vec<PathBuf>,

@@ -114,6 +114,7 @@ impl OutputArguments {
         if let Some(path) = &self.plots {
             folder::check(path, self.folder.force)?;
         }
+        self.report.as_deref().map(output::check_page).transpose()?;
         let own = [&self.csv, &self.report, &self.json].map(Option::as_ref);
         Ok(Outputs::new(others.iter().chain(&own).copied().flatten())?.quieted(self.quiet))
     }

@@ -67,6 +67,7 @@ pub fn run(arguments: &SheetArguments, quiet: bool) -> Result<(), Failure> {
         values::MINUTES.check(flag, value)?;
     }
     arguments.bar_mm.map(|mm| values::BAR_MM.check("--bar-mm", mm)).transpose()?;
+    output::check_page(&arguments.out)?;
     let outputs = output::Outputs::new([&arguments.out])?.quieted(quiet);
     let reading = ReadOptions { read_data: false, ..arguments.session.options() };
     let source = files::text(&arguments.session.session, "the session file")?;

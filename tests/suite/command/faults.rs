@@ -218,7 +218,6 @@ fn an_output_that_would_replace_an_input() {
     for (line, name) in [
         ("fit session.toml --json session.toml", "session.toml"),
         ("fit session.toml --csv ./circle.csv", "./circle.csv"),
-        ("fit session.toml --report circle.csv", "circle.csv"),
         ("fit session.toml --json link.csv", "link.csv"),
         ("trace session.toml --quiet --write session.toml", "session.toml"),
         ("plan session.toml --no-effects --json circle.csv", "circle.csv"),

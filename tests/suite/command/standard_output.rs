@@ -138,6 +138,24 @@ fn standard_output_takes_one_output_and_no_folder() {
     }
 }
 
+/// A page under a name that promises another format: refused before the work, and nothing is written.
+#[test]
+fn a_page_is_named_as_html() {
+    let place = test_folder();
+    let session = place.at("session.toml");
+    for (command, option, name, words) in [
+        ("fit", "--report", "report.pdf", "which a browser prints as PDF"),
+        ("plan", "--report", "report.csv", "name a file that ends in `.html`"),
+        ("sheet", "--out", "sheets.PDF", "which a browser prints as PDF"),
+    ] {
+        let page = place.at(name);
+        let output = abbe(&[command, text(&session), option, text(&page)]);
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{command}: {stderr}");
+        assert!(stderr.contains(words) && stderr.contains(name) && !page.exists(), "{command}: {stderr}");
+    }
+}
+
 #[test]
 fn the_help_and_the_readme_state_the_exit_statuses() {
     let help = String::from_utf8(abbe(&["--help"]).stdout).unwrap();
