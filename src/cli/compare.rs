@@ -97,15 +97,15 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Failure> {
 }
 
 /// What an input was read from.
-pub enum InputFiles {
+enum InputFiles {
     Session(Box<SourceMap>),
     Model(Option<FileStamp>),
 }
 
 /// An input with its files.
-pub type File = (Input, InputFiles);
+type File = (Input, InputFiles);
 
-pub fn read(file: &Path, options: &ReadOptions, outputs: &Outputs) -> Result<File, Failure> {
+fn read(file: &Path, options: &ReadOptions, outputs: &Outputs) -> Result<File, Failure> {
     let source = files::text(file, "the session or model")?;
     // A model is JSON; no session begins with a brace.
     if source.text.trim_start().starts_with('{') {

@@ -2,10 +2,9 @@
 
 use std::path::PathBuf;
 
-use abbe::apply::compare::Input;
 use abbe::identify::{fit, repeated};
+use abbe::model::files;
 
-use super::compare::{self, InputFiles};
 use super::failure::Failure;
 use super::output::{self, Outputs};
 use super::results::Read;
@@ -26,13 +25,15 @@ pub fn run(
         if all[..place].iter().any(|earlier| output::is_same(earlier, path)) {
             return Err(Failure::Other(format!("{} is named twice; name each repeated session once", path.display())));
         }
-        match compare::read(path, &data.options(), outputs)? {
-            (Input::Session(session), InputFiles::Session(sources)) => read.push((*session, *sources)),
-            _ => {
-                let file = path.display();
-                return Err(Failure::Other(format!("{file} is a model; `--repeated` compares the fits of sessions")));
-            }
+        let source = files::text(path, "the session")?;
+        // A model is JSON; no session begins with a brace.
+        if source.text.trim_start().starts_with('{') {
+            let file = path.display();
+            return Err(Failure::Other(format!("{file} is a model; `--repeated` compares the fits of sessions")));
         }
+        let (session, sources) = files::session_of(&source, &data.options())?;
+        outputs.refuse_overwrite_of_sources(&sources)?;
+        read.push((session, sources));
     }
     let (mut sessions, mut warnings) = (Vec::with_capacity(all.len()), Vec::new());
     for (path, (session, _)) in all.iter().zip(&read) {
