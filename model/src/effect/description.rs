@@ -124,6 +124,8 @@ impl EffectTerms<'_> {
             Component::Axis(name) => self.axis_motion(name),
             Component::Instrument { thing, coordinate } => match (thing.as_str(), coordinate.as_str()) {
                 ("bar", _) => "length".to_string(),
+                // The channel whose zero it is.
+                ("zero", channel) if !channel.is_empty() => channel.to_string(),
                 (thing, "") => thing.replace('_', " "),
                 (_, "a" | "b" | "c") => {
                     let about = ["a", "b", "c"].iter().position(|letter| letter == coordinate);

@@ -55,9 +55,10 @@ impl Scale {
         Scale { values: [(low / step + 1e-9).floor() * step, (high / step - 1e-9).ceil() * step], step, words }
     }
 
-    /// A scale over this range and zero, extended to whole steps.
+    /// A scale over this range and zero, extended to whole steps. Values that look equal do not lie on the edge.
     pub fn with_zero([low, high]: [f64; 2], ticks: usize) -> Scale {
-        Scale::rounded([low.min(0.0), high.max(0.0)], ticks)
+        let beyond = if high - low <= 1e-3 * high.abs() { 1.2 } else { 1.0 };
+        Scale::rounded([(beyond * low).min(0.0), (beyond * high).max(0.0)], ticks)
     }
 
     /// A scale over the range of an axis position. The steps of an angle divide a revolution.
@@ -165,6 +166,10 @@ mod tests {
         let scale = Scale::rounded([-3.2, 9.1], 5);
         assert_eq!(scale.values, [-5.0, 10.0]);
         assert_eq!(scale.ticks(), [-5.0, 0.0, 5.0, 10.0]);
+        // A constant curve is no edge of its plot.
+        assert_eq!(Scale::with_zero([-10.0, -10.0], 6).values, [-12.0, 0.0]);
+        assert!(Scale::with_zero([-10.0, -9.999_999], 6).values[0] < -11.0);
+        assert_eq!(Scale::with_zero([-10.0, 4.0], 7).values, [-10.0, 4.0]);
         let scale = scale.between([100.0, 0.0]);
         assert!((scale.at(10.0) - 0.0).abs() < 1e-9 && (scale.at(-5.0) - 100.0).abs() < 1e-9);
     }

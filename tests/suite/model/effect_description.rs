@@ -8,7 +8,7 @@ use abbe::identify::problem::Problem;
 use abbe::model::chain::Machine;
 use abbe::model::component::{ErrorKind, Freedom};
 use abbe::model::driver::Driver;
-use abbe::model::effect::description::{explanations, meaning};
+use abbe::model::effect::description::{component_meaning, explanations, meaning};
 use abbe::model::effect::shape::{Harmonic, Periodic, Power, Steps, Warmup};
 use abbe::model::effect::{Component, Effect, Shape};
 use abbe::model::files::{ReadOptions, session as read};
@@ -169,4 +169,21 @@ fn explanations_are_grouped_by_part() {
         explanations(&all),
         "C table: axial motion twice per turn, or tilt about X once per turn; or B head: axial motion once per turn"
     );
+}
+
+/// The zero of a channel is named by the channel, and angles of a sensor by their letters.
+#[test]
+fn coordinates_of_an_instrument_are_named() {
+    let machine = circle().machine;
+    for (thing, coordinate, part, what) in [
+        ("zero", "displacement", "zero", "displacement"),
+        ("zero", "pitch", "zero", "pitch"),
+        ("sensor", "omega", "sensor", "angle omega"),
+        ("station", "b", "station", "tilt about Y"),
+        ("workpiece_ball", "x", "workpiece ball", "shift in X"),
+    ] {
+        let component = Component::Instrument { thing: thing.to_string(), coordinate: coordinate.to_string() };
+        let described = component_meaning(&machine, &component);
+        assert_eq!((described.part.as_str(), described.what.as_str()), (part, what));
+    }
 }
