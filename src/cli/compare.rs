@@ -107,8 +107,7 @@ type File = (Input, InputFiles);
 
 fn read(file: &Path, options: &ReadOptions, outputs: &Outputs) -> Result<File, Failure> {
     let source = files::text(file, "the session or model")?;
-    // A model is JSON; no session begins with a brace.
-    if source.text.trim_start().starts_with('{') {
+    if model_file::is_model(&source.text) {
         outputs.refuse_overwrite([file])?;
         let model = model_file::of_source(&source)?;
         return Ok((Input::Model(Box::new(model)), InputFiles::Model(source.stamp)));

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use abbe::identify::{fit, repeated};
+use abbe::identify::{fit, model_file, repeated};
 use abbe::model::files;
 
 use super::failure::Failure;
@@ -26,8 +26,7 @@ pub fn run(
             return Err(Failure::Other(format!("{} is named twice; name each repeated session once", path.display())));
         }
         let source = files::text(path, "the session")?;
-        // A model is JSON; no session begins with a brace.
-        if source.text.trim_start().starts_with('{') {
+        if model_file::is_model(&source.text) {
             let file = path.display();
             return Err(Failure::Other(format!("{file} is a model; `--repeated` compares the fits of sessions")));
         }

@@ -33,7 +33,7 @@ use crate::unit::ReadingUnit;
 use crate::unit::Unit;
 pub use document::{InputFile, MotionRange, Provenance};
 pub use range::DriverRange;
-pub use read::{of_source, read};
+pub use read::{is_model, of_source, read};
 
 /// A parameter of a model.
 #[derive(Clone, Debug, PartialEq)]

@@ -46,6 +46,11 @@ pub fn read(path: &Path) -> Result<IdentifiedModel, IdentifyError> {
     Ok(of_source(&files::text(path, "the model file")?)?)
 }
 
+/// Whether a text is meant as a saved model rather than a session. A model is JSON; no session begins with a brace.
+pub fn is_model(text: &str) -> bool {
+    text.trim_start().starts_with('{')
+}
+
 /// As [`read`], from a file that has been read.
 ///
 /// # Errors
