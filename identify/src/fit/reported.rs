@@ -34,6 +34,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
     warnings.extend(plausibility::warnings(&plausibility));
     warnings.extend(plausibility::coefficients::warnings(problem, fit));
     warnings.extend(noise::stated_against_repeats(problem, &fit.residuals));
+    warnings.extend(noise::silent_channels(problem, &fit.residuals, fit.rank.identifiable_basis.ncols()));
     warnings.extend(mislabelled_runs(&problem.tests));
     warnings.extend(enlargement_warning(fit.u_enlargement));
     warnings.extend(assume::statements(problem));

@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 
 pub use autocorrelation::Autocorrelation;
 pub(crate) use autocorrelation::enlargement_of_mean;
-pub(crate) use stated::stated_against_repeats;
+pub(crate) use stated::{silent_channels, stated_against_repeats};
 #[cfg(test)]
 pub(crate) use trends::trend_terms;
 pub(crate) use trends::{TERMS, Trends};

@@ -33,3 +33,42 @@ pub(crate) fn stated_against_repeats(problem: &Problem, residuals: &[Vec<f64>]) 
         )
     })
 }
+
+/// Share of the stated noise below which the residual of a channel is no noise.
+const SILENT: f64 = 0.1;
+/// Share of the stated noise above which another channel of the test shows that the test has noise.
+const HEARD: f64 = 0.3;
+/// Smallest number of readings of a channel for this decision.
+const MIN_READINGS: usize = 20;
+
+/// A warning for each channel of a test whose residual is far below the stated noise, while that of another channel is not: the
+/// values of its column are too small, as those of an angle in rad in a column of arcsec are. `rank` parameters were fitted
+/// to `residuals`, mm, test by test.
+pub(crate) fn silent_channels(problem: &Problem, residuals: &[Vec<f64>], rank: usize) -> Vec<String> {
+    let Some(stated_mm) = problem.session.stated_noise_mm() else { return Vec::new() };
+    let mut warnings = Vec::new();
+    for (test, residual) in residuals.iter().enumerate() {
+        let channels = problem.models[test].channels();
+        let shares: Vec<Option<f64>> = (0..channels.len())
+            .map(|channel| {
+                let own = (channel..residual.len()).step_by(channels.len()).filter(|i| problem.counts(test, *i));
+                let squares: Vec<f64> = own.map(|i| residual[i] * residual[i]).collect();
+                let enough = squares.len() >= MIN_READINGS.max(2 * rank);
+                enough.then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt() / stated_mm)
+            })
+            .collect();
+        if !shares.iter().flatten().any(|share| *share > HEARD) {
+            continue;
+        }
+        for (channel, share) in channels.iter().zip(&shares) {
+            if let Some(share) = share.filter(|share| *share < SILENT) {
+                warnings.push(format!(
+                    "test \"{}\": the residual of {} is {share:.1e} of the stated noise, that of another channel is not small; check \
+                     the unit in the name of its column",
+                    problem.tests[test].name, channel.name
+                ));
+            }
+        }
+    }
+    warnings
+}

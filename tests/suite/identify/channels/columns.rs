@@ -77,3 +77,26 @@ fn a_noise_of_another_unit_is_a_warning() {
     ));
     assert!(session.warnings.iter().any(|warning| warning.contains("state `noise_arcsec`")), "{:?}", session.warnings);
 }
+
+/// Angles in rad under a name in arcsec: their residual is far below the stated noise, that of the displacement is not.
+/// Without noise in any channel nothing is doubted.
+#[test]
+fn a_channel_without_noise_beside_one_with_noise_is_a_warning() {
+    let folder = Folder::new();
+    for (unit, noise, doubts) in [(1.0, 1.0, false), (1.0 / 206_264.8, 1.0, true), (1.0 / 206_264.8, 1e-3, false)] {
+        let mut random = Pcg64::seed_from_u64(11);
+        let mut data = String::from("run,x_mm,displacement_mm,pitch_arcsec\n");
+        for (run, step) in (1..=2).flat_map(|run| (0..=30).map(move |step| (run, step))) {
+            let x = f64::from(if run == 1 { 10 * step } else { 300 - 10 * step });
+            let displacement = x + 1e-4 * noise * normal(&mut random);
+            data += &format!("{run},{x},{displacement:.9},{:.12}\n", (3.0 + 0.2 * noise * normal(&mut random)) * unit);
+        }
+        folder.write("laser.csv", &data);
+        let session =
+            folder.session(&format!("{MILL}{LASER}[[test]]\nname = \"L\"\ndata = \"laser.csv\"\nbeam = [1, 0, 0]\n"));
+        let (problem, found) = prepare(&session, 1).unwrap();
+        let warnings = fit::report(&problem, &found).unwrap().warnings;
+        let warned = warnings.iter().any(|warning| warning.contains("the residual of pitch is"));
+        assert_eq!(warned, doubts, "{warnings:?}");
+    }
+}
