@@ -1,5 +1,6 @@
 //! The products of candidates against least squares on their rows.
 
+use std::fmt::Write;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -151,4 +152,45 @@ fn candidates_in_parts_have_the_scores_of_all_together() {
     let near =
         |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-9 * a.abs());
     assert!(near(&gains, &in_parts) && near(&best, &best_in_parts), "{best:?} {best_in_parts:?}");
+}
+
+/// A circle of 12,000 positions, read twice: its states are shared among several tasks, whose sums add up.
+#[test]
+fn gains_of_a_long_session_are_those_of_least_squares() {
+    const POSITIONS: usize = 12_000;
+    let folder = tempfile::tempdir().unwrap();
+    let mut table = String::from("run,x_mm,y_mm,length_mm\n");
+    for i in 0..2 * POSITIONS {
+        let (sin, cos) = (std::f64::consts::TAU * (i % POSITIONS) as f64 / POSITIONS as f64).sin_cos();
+        // Readings with a harmonic and something like noise.
+        let length = 100.0 + 1e-3 * (3.0 * sin * cos + ((i * i) as f64).sin());
+        writeln!(table, "{},{:.9},{:.9},{length:.9}", 1 + i / POSITIONS, -100.0 * cos, -100.0 * sin).unwrap();
+    }
+    std::fs::write(folder.path().join("circle.csv"), table).unwrap();
+    let text = "[machine]\nchain = \"w b Y X t\"\n[machine.axis.X]\n[machine.axis.Y]\n[instrument]\nkind = \"ballbar\"\n\
+        noise_um = 0.7\n[unknowns]\nerrors = [\"EC0Y\"]\n[[test]]\nname = \"XY\"\ndata = \"circle.csv\"\nbar_mm = 100.0\n\
+        workpiece_ball_mm = [0, 0, 0]\nspindle_ball_mm = [0, 0, 0]\nworkpiece_ball_u_um = [2, 2, 0]\n";
+    let file = folder.path().join("session.toml");
+    std::fs::write(&file, text).unwrap();
+    let (problem, fit) = prepare(&files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
+    let columns = Columns::new(&problem, &fit.beta);
+    let (model, residual) = model(&columns, &fit.beta);
+    let all = library::candidates(&problem).unwrap();
+    let sets: Vec<EffectColumns> =
+        all.iter().step_by(all.len() / 30).filter_map(|member| columns.effect_columns(&member.effect)).collect();
+    assert!(sets.iter().any(|set| set.channel.states.samples.len() > 4096), "all states in one task");
+    let rank = model.ncols();
+    let prior = PriorGram { base: Mat::zeros(rank, rank), base_y: vec![0.0; rank] };
+    let gram = Gram::new(&columns, sets.clone(), Arc::new(model.clone()), &residual, prior);
+    let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
+    let trained = TrainedModel::new(&gram, &[], &folds).unwrap();
+    let gains = trained.gains(&|_| true).unwrap();
+    let before = left(&columns, &folds, &[&model], &residual);
+    let mut compared = 0;
+    for (set, gain) in sets.iter().zip(&gains).filter(|(set, gain)| gain.freedom >= set.count + set.numbers) {
+        let found = before - left(&columns, &folds, &[&model, &rows(&columns, &[set])], &residual);
+        assert!((gain.gain - found).abs() <= 1e-6 * found + 1e-7 * before, "{} {found} of {before}", gain.gain);
+        compared += 1;
+    }
+    assert!(compared >= 5, "{compared} of {}", sets.len());
 }
