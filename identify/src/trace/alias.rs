@@ -52,15 +52,15 @@ pub struct CompetingEffect {
     pub alias: bool,
 }
 
-/// Rounds to six decimals. Lists are sorted by this value, so that rounding errors decide no tie.
-fn to_six_decimals(value: f64) -> f64 {
-    (value * 1e6).round() / 1e6
-}
+/// Decimals of a cosine in an order.
+const DECIMALS_OF_COSINE: i32 = 6;
+/// Decimals of a logarithm of a probability in an order: it is as large as 10⁵, and basis functions are in single precision.
+const DECIMALS_OF_LN: i32 = 2;
 
-/// Rounds a logarithm of a probability to two decimals, for the same reason: it is as large as 10⁵, and basis functions are in
-/// single precision.
-fn to_two_decimals(value: f64) -> f64 {
-    (value * 1e2).round() / 1e2
+/// Rounds to some decimals. Lists are sorted by this value, so that rounding errors decide no tie.
+fn rounded(value: f64, decimals: i32) -> f64 {
+    let scale = 10.0_f64.powi(decimals);
+    (value * scale).round() / scale
 }
 
 /// The order of two equally good candidates: by description length, then by identifier, then by index.
@@ -97,7 +97,7 @@ fn competing_effects(
         })
         .map(|(candidate, gain)| {
             let evidence = search.evidence_for(candidate, gain, variance);
-            (to_two_decimals(evidence), candidate)
+            (rounded(evidence, DECIMALS_OF_LN), candidate)
         })
         .collect();
     ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| simplest_first(search, a.1, b.1)));
@@ -169,9 +169,9 @@ pub(super) fn aliases(
         }
     }
     aliases.sort_by(|a, b| {
-        to_two_decimals(b.ln_probability_ratio())
-            .total_cmp(&to_two_decimals(a.ln_probability_ratio()))
-            .then_with(|| to_six_decimals(b.cosine).total_cmp(&to_six_decimals(a.cosine)))
+        rounded(b.ln_probability_ratio(), DECIMALS_OF_LN)
+            .total_cmp(&rounded(a.ln_probability_ratio(), DECIMALS_OF_LN))
+            .then_with(|| rounded(b.cosine, DECIMALS_OF_COSINE).total_cmp(&rounded(a.cosine, DECIMALS_OF_COSINE)))
             .then_with(|| simplest_first(search, a.candidate, b.candidate))
     });
     // The most probable candidate represents all candidates with its identifier. Candidates with the found effect's own

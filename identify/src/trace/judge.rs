@@ -97,6 +97,5 @@ fn remaining_structure(
     let start = Start::of(problem, &columns, fit)?;
     let (count, seed) = (null_draw_count(options), options.seed.wrapping_add(1));
     let draws = null::draws(problem, &columns, &fit.residuals, &start.residual, count, SINGLE, seed);
-    let prior = start.prior();
-    remainder::structure(problem, &columns, start.model, &start.residual, draws, prior, should_continue)
+    remainder::structure(problem, &columns, &start, draws, should_continue)
 }

@@ -319,10 +319,7 @@ fn trace_or_interrupted(
         draws.enumerate().map(told)
     };
     let should_continue = || interrupt.check().is_ok();
-    let structure_before = || {
-        let (model, prior) = (start.model.clone(), start.prior());
-        remainder::structure(problem, &columns, model, &start.residual, null(SINGLE), prior, &should_continue)
-    };
+    let structure_before = || remainder::structure(problem, &columns, &start, null(SINGLE), &should_continue);
     let structure_before = || policy.tests_structure.then(structure_before).transpose();
     // In a long session the arrays of the structure test are freed before those of the library are formed.
     let tested = (columns.rows() > MAX_AT_THE_SAME_TIME).then(structure_before);

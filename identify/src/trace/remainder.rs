@@ -5,24 +5,22 @@
 //! the same pure error as that of the search.
 
 use std::ops::Range;
-use std::sync::Arc;
 
+use super::constants::STRUCTURED;
+use super::start::Start;
+use crate::candidates::columns::{Columns, EffectColumns};
+use crate::candidates::gain::TrainedModel;
+use crate::candidates::gram::Gram;
+use crate::error::IdentifyError;
+use crate::numerics::parallel;
+use crate::numerics::tails::ln_chi_square_tail;
+use crate::problem::Problem;
 use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::driver::Driver;
 use abbe_model::effect::shape::{Curve, Local, Periodic};
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::instrument::channel::{Channel, labels};
 use abbe_model::session::readings::Readings;
-use faer::Mat;
-
-use super::constants::STRUCTURED;
-use crate::candidates::columns::{Columns, EffectColumns};
-use crate::candidates::gain::TrainedModel;
-use crate::candidates::gram::{Gram, PriorGram};
-use crate::error::IdentifyError;
-use crate::numerics::parallel;
-use crate::numerics::tails::ln_chi_square_tail;
-use crate::problem::Problem;
 
 /// Structure in a residual.
 #[derive(Clone, Debug)]
@@ -208,10 +206,10 @@ struct Batch<'d> {
 }
 
 impl<'d> Batch<'d> {
-    fn of(detectors: &'d [Detector], columns: &Columns<'_>) -> Batch<'d> {
+    fn of(detectors: &'d [Detector], columns: &Columns<'_>, max_entries: usize) -> Batch<'d> {
         let mut batch = Batch { detectors: Vec::new(), sets: Vec::new(), rest: detectors };
         let mut entries = 0;
-        while entries < MAX_ENTRIES && !batch.rest.is_empty() {
+        while entries < max_entries && !batch.rest.is_empty() {
             let (part, rest) = batch.rest.split_at(AT_ONCE.min(batch.rest.len()));
             let sets = parallel::map(part.len(), &|k| part[k].columns(columns));
             for (detector, set) in part.iter().zip(sets).filter_map(|(detector, set)| Some((detector, set?))) {
@@ -225,25 +223,35 @@ impl<'d> Batch<'d> {
     }
 }
 
-/// Tests a residual for structure that a model, given by its orthonormal columns, does not explain.
+/// Tests the residual of a fit for structure that its model does not explain.
 ///
 /// # Errors
 /// If products are not finite, or [`IdentifyError::Interrupted`] if `should_continue` returns `false`.
-pub fn structure(
+pub(super) fn structure(
     problem: &Problem,
     columns: &Columns<'_>,
-    model: Arc<Mat<f64>>,
-    residual: &[f64],
+    start: &Start,
     null: impl ExactSizeIterator<Item = Vec<f64>> + Send,
-    prior: PriorGram,
+    should_continue: &(dyn Fn() -> bool + Sync),
+) -> Result<Structure, IdentifyError> {
+    structure_by_batches(problem, columns, start, null, MAX_ENTRIES, should_continue)
+}
+
+/// The test with batches of about `max_entries` entries.
+fn structure_by_batches(
+    problem: &Problem,
+    columns: &Columns<'_>,
+    start: &Start,
+    null: impl ExactSizeIterator<Item = Vec<f64>> + Send,
+    max_entries: usize,
     should_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Structure, IdentifyError> {
     let detectors = detectors(problem);
-    let mut batch = Batch::of(&detectors, columns);
+    let mut batch = Batch::of(&detectors, columns, max_entries);
     // In a long session the detectors come in batches, for which the null draws are kept.
     let in_batches = !batch.rest.is_empty();
     let sets = if in_batches { Vec::new() } else { std::mem::take(&mut batch.sets) };
-    let mut first = Gram::new(columns, sets, model, residual, prior);
+    let mut first = Gram::new(columns, sets, start.model.clone(), &start.residual, start.prior());
     first.take_draws(null, in_batches, should_continue)?;
     let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
     let mut best: Option<(&Detector, f64, f64)> = None;
@@ -269,7 +277,7 @@ pub fn structure(
         if batch.rest.is_empty() {
             break;
         }
-        batch = Batch::of(batch.rest, columns);
+        batch = Batch::of(batch.rest, columns, max_entries);
     }
     let Some((detector, score, excess)) = best else {
         return Ok(Structure {
@@ -293,7 +301,6 @@ mod tests {
 
     use super::*;
     use crate::fit::prepare;
-    use crate::trace::start::Start;
 
     #[test]
     fn a_structure_test_can_be_interrupted() {
@@ -303,11 +310,29 @@ mod tests {
         let start = Start::of(&problem, &columns, &fit).unwrap();
         let tested = |should_continue: bool| {
             let draws = std::iter::repeat_n(vec![0.0; start.residual.len()], 3);
-            let (model, prior) = (start.model.clone(), start.prior());
-            structure(&problem, &columns, model, &start.residual, draws, prior, &|| should_continue)
+            structure(&problem, &columns, &start, draws, &|| should_continue)
         };
         assert!(matches!(tested(false), Err(IdentifyError::Interrupted)));
         // One of four: no draw has structure.
         assert_eq!(tested(true).unwrap().p_value, 0.25);
+    }
+
+    /// Detectors that come in batches lead to the decision of all together.
+    #[test]
+    fn batches_of_detectors_find_the_same_structure() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let (problem, fit) = prepare(&files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
+        let columns = Columns::new(&problem, &fit.beta);
+        let start = Start::of(&problem, &columns, &fit).unwrap();
+        let draw = |k: usize| (0..start.residual.len()).map(|i| ((i * (2 * k + 3)) as f64).sin()).collect();
+        let found = |max_entries: usize| {
+            structure_by_batches(&problem, &columns, &start, (0..9).map(draw), max_entries, &|| true).unwrap()
+        };
+        let (together, in_batches) = (found(MAX_ENTRIES), found(1));
+        // The undeclared harmonic of the table is larger than any of the draws.
+        assert_eq!((together.p_value, in_batches.p_value), (0.1, 0.1));
+        assert_eq!(together.description, in_batches.description);
+        assert!(together.description.contains("over C"), "{}", together.description);
+        assert!((together.excess / in_batches.excess - 1.0).abs() < 1e-9 && together.excess > 1000.0);
     }
 }
