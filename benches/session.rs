@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-use abbe::identify::fit::SessionFit;
+use abbe::identify::SessionFit;
 use abbe::identify::noise::{Noise, NoiseSource};
 use abbe::identify::problem::Problem;
 use abbe::prelude::*;

@@ -77,7 +77,7 @@ pub mod prelude {
 
     pub use abbe_codegen::print::Style;
     pub use abbe_codegen::{Equation, Options as EquationOptions, Order, SessionTest, check, language};
-    pub use abbe_identify::fit::SessionFit;
+    pub use abbe_identify::SessionFit;
     pub use abbe_identify::quantity::Given;
     pub use abbe_identify::results::{FitResult, ParameterResult, TraceResult};
     pub use abbe_identify::simulate::{Simulated, Simulation, simulate};

@@ -76,6 +76,7 @@ pub mod repeated;
 pub mod results;
 pub mod self_calibration;
 pub mod series;
+mod session_fit;
 pub mod simulate;
 pub mod start;
 pub mod statements;
@@ -86,3 +87,4 @@ pub mod unit;
 pub mod validate;
 
 pub use error::IdentifyError;
+pub use session_fit::SessionFit;

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use abbe::document::{Call, Document, StatedFit};
-use abbe::identify::fit::{Fit as Estimated, SessionFit};
+use abbe::identify::SessionFit;
+use abbe::identify::fit::Fit as Estimated;
 use abbe::identify::model_file::IdentifiedModel;
 use abbe::identify::problem::Problem;
 use abbe::report::block::Report;

@@ -1,7 +1,7 @@
 //! `abbe fit`: estimate errors from readings.
 
 use abbe::document::StatedFit;
-use abbe::identify::{fit, propagation};
+use abbe::identify::{SessionFit, fit, propagation};
 use clap::Args;
 
 use super::failure::Failure;
@@ -72,9 +72,8 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         return arguments.method.run(&session, &arguments.draws, (common, &outputs), &read);
     }
     let draws = arguments.draws.draws(common.seed)?;
-    let (problem, found) = fit::prepare(&session, common.seed)?;
+    let SessionFit { problem, fit: found, mut result } = SessionFit::of(&session, common.seed)?;
     arguments.readings.write(&problem, &found)?;
-    let mut result = fit::report(&problem, &found)?;
     arguments.plausibility.check(&result.plausibility)?;
     if let Some(draws) = &draws {
         propagation::add_monte_carlo(&problem, &found, draws, &mut result)?;

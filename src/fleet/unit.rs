@@ -11,7 +11,7 @@ use abbe_identify::IdentifyError;
 use abbe_identify::results::{FitResult, TraceResult};
 use abbe_identify::trace::{Progress, TraceOptions, trace};
 use abbe_identify::validate::validate;
-use abbe_identify::{fit, model_file};
+use abbe_identify::{SessionFit, model_file};
 use abbe_model::document::{of_domain, print};
 use abbe_model::files::stamp::FileStamp;
 use abbe_model::files::{self, ReadOptions, Source, SourceMap};
@@ -243,8 +243,7 @@ fn identify(
     should_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<(), IdentifyError> {
     if record.options.no_trace {
-        let (problem, found) = fit::prepare(session, record.seed)?;
-        set_fit(record, &fit::report(&problem, &found)?);
+        set_fit(record, &SessionFit::of(session, record.seed)?.result);
         return Ok(());
     }
     let options = TraceOptions {

@@ -1,7 +1,7 @@
 //! A fit.
 
 use abbe::document::StatedFit;
-use abbe::identify::fit::SessionFit;
+use abbe::identify::SessionFit;
 use abbe::report::block::Report;
 use abbe::report::commands::Commands;
 use abbe::report::{self, readings};

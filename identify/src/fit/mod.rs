@@ -15,7 +15,6 @@ pub(crate) mod outcome;
 mod prepare;
 mod quantities;
 mod reported;
-mod session;
 pub mod tpoint;
 
 use std::cell::RefCell;
@@ -41,7 +40,6 @@ pub(crate) use prepare::{prepare_with, refit, with_families, with_families_linea
 pub(crate) use quantities::{Quantity, quantities, values_at};
 pub(crate) use reported::{ids, rms_of_units};
 pub use reported::{outliers, parameters, report, unobservable};
-pub use session::SessionFit;
 
 /// The result of a fit, in internal units.
 #[derive(Clone, Debug)]

@@ -51,7 +51,7 @@ impl RefittedModel {
             after_fit = refit(&mut after, &after_fit)?;
         }
         let structure = structure_before
-            .map(|_| remaining_structure(&after, &after_fit, options, &|| search.should_continue()))
+            .map(|_| structure(&after, &after_fit, options, options.seed.wrapping_add(1), &|| search.should_continue()))
             .transpose()?;
         Ok(RefittedModel { after, after_fit, effects, structure })
     }
@@ -86,16 +86,17 @@ fn noise_is_from_residual(search: &Problem, fit: &Problem) -> bool {
     of_search.source == NoiseSource::Repeats && !(of_search.ar_coefficients.is_empty() && of_one_size)
 }
 
-/// The remaining structure in the residual of a fit.
-fn remaining_structure(
+/// The structure in the residual of a fit.
+pub(super) fn structure(
     problem: &Problem,
     fit: &Fit,
     options: &TraceOptions,
+    seed: u64,
     should_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Structure, IdentifyError> {
     let columns = Columns::new(problem, &fit.beta);
     let start = Start::of(problem, &columns, fit)?;
-    let (count, seed) = (null_draw_count(options), options.seed.wrapping_add(1));
+    let count = null_draw_count(options);
     let draws = null::draws(problem, &columns, &fit.residuals, &start.residual, count, SINGLE, seed);
     remainder::structure(problem, &columns, &start, draws, should_continue)
 }

@@ -198,9 +198,7 @@ fn with_noise_of_repeats(
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<TraceOutcome, IdentifyError> {
-    if estimate_noise_model(&mut problem, &before_fit.residuals) {
-        before_fit = fit(&problem, Some(&before_fit.beta))?;
-    }
+    before_fit = with_noise_model(&mut problem, before_fit)?;
     let residuals = before_fit.residuals.clone();
     let mut first = trace_with(problem, before_fit, &residuals, options, progress)?;
     let mut first = match with_noise_less_strongest(&first, options, progress)? {
@@ -233,6 +231,29 @@ fn with_noise_of_repeats(
     // The first search is complete, although its noise model is less accurate.
     first.result.mark_interrupted();
     Ok(first)
+}
+
+/// The fit with the noise model estimated from repeats, if they change it.
+fn with_noise_model(problem: &mut Problem, found: Fit) -> Result<Fit, IdentifyError> {
+    match estimate_noise_model(problem, &found.residuals) {
+        true => fit(problem, Some(&found.beta)),
+        false => Ok(found),
+    }
+}
+
+/// The structure in the residual of a fit, as a trace would find it before its search; `None` if there are too few poses
+/// for the test.
+///
+/// # Errors
+/// If the model cannot be evaluated.
+pub fn structure_of_fit(problem: &Problem, fit: &Fit, seed: u64) -> Result<Option<Structure>, IdentifyError> {
+    let options = TraceOptions { seed, ..TraceOptions::default() };
+    let mut problem = problem.clone();
+    let fit = with_noise_model(&mut problem, fit.clone())?;
+    match Policy::of(&problem).tests_structure {
+        true => judge::structure(&problem, &fit, &options, seed, &|| true).map(Some),
+        false => structure_of_poses(&problem, &fit, &options),
+    }
 }
 
 /// Searches again with the noise that remains beside the best candidate, if no effect was found in autocorrelated noise and

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use abbe::identify::SessionFit;
 use abbe::identify::candidates::named::effect;
-use abbe::identify::fit::SessionFit;
 use abbe::identify::problem::Problem;
 use abbe::model::effect::Effect;
 use abbe::model::session::Session;

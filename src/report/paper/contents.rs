@@ -1,7 +1,7 @@
 //! What the sections hold: selections of the tables and figures of a plan and of a fit.
 
 use abbe::identify::IdentifyError;
-use abbe::identify::fit::SessionFit;
+use abbe::identify::SessionFit;
 use abbe::identify::problem::Problem;
 use abbe::identify::series::{paths, views};
 use abbe::model::words::counted;

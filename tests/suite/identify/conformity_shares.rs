@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use abbe::identify::fit::SessionFit;
+use abbe::identify::SessionFit;
 use abbe::identify::tolerance::rule::Decision;
 use abbe::model::chain::Machine;
 use abbe::model::component::ErrorName;

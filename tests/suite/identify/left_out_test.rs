@@ -1,6 +1,6 @@
 //! A left-out test is predicted by the right component and not by its alias.
 
-use abbe::identify::fit::SessionFit;
+use abbe::identify::SessionFit;
 use abbe::identify::results::FitResult;
 use abbe::model::driver::Driver as FollowedDriver;
 use abbe::model::effect::shape::Harmonic;
