@@ -1,6 +1,5 @@
 //! Solutions of linear systems: the singular values of a matrix, and what follows from them.
 
-use faer::linalg::solvers::Svd as Factors;
 use faer::prelude::Solve;
 use faer::{Mat, MatRef};
 
@@ -9,7 +8,8 @@ use crate::error::IdentifyError;
 
 /// A matrix `A = U·S·Vᵀ` with its singular values in descending order.
 pub struct Svd {
-    svd: Factors<f64>,
+    left: Mat<f64>,
+    right: Mat<f64>,
     /// The singular values.
     pub singular_values: Vec<f64>,
 }
@@ -20,19 +20,41 @@ impl Svd {
     /// # Errors
     /// If the matrix has entries that are not finite.
     pub fn of(matrix: MatRef<'_, f64>) -> Result<Svd, IdentifyError> {
-        let svd = matrix.thin_svd().map_err(|_| IdentifyError::Decomposition)?;
+        if !matrix.is_all_finite() {
+            return Err(IdentifyError::Decomposition);
+        }
+        // The iteration of the decomposition ends without convergence at few finite matrices (one of 39 parameters in some
+        // thousand traces). That of the transposed matrix, or of the rows in reverse order, takes another course.
+        Svd::directly(matrix)
+            .or_else(|| Svd::directly(matrix.transpose()).map(Svd::transposed))
+            .or_else(|| Svd::directly(matrix.reverse_rows()).map(Svd::with_reversed_rows))
+            .ok_or(IdentifyError::Decomposition)
+    }
+
+    fn directly(matrix: MatRef<'_, f64>) -> Option<Svd> {
+        let svd = matrix.thin_svd().ok()?;
         let singular_values = svd.S().column_vector().iter().copied().collect();
-        Ok(Svd { svd, singular_values })
+        Some(Svd { left: svd.U().to_owned(), right: svd.V().to_owned(), singular_values })
+    }
+
+    /// The decomposition of the transposed matrix.
+    fn transposed(self) -> Svd {
+        Svd { left: self.right, right: self.left, ..self }
+    }
+
+    /// The decomposition of the matrix with its rows in reverse order.
+    fn with_reversed_rows(self) -> Svd {
+        Svd { left: self.left.as_ref().reverse_rows().to_owned(), ..self }
     }
 
     /// The left singular vectors `U`, one column each.
     pub fn left(&self) -> MatRef<'_, f64> {
-        self.svd.U()
+        self.left.as_ref()
     }
 
     /// The right singular vectors `V`, one column each.
     pub fn right(&self) -> MatRef<'_, f64> {
-        self.svd.V()
+        self.right.as_ref()
     }
 
     /// Number of singular values above a share of the largest.
@@ -123,6 +145,25 @@ mod tests {
             let of_inverse: f64 = (0..4).map(|i| inverse[(k, i)] * c[i]).sum();
             assert!((of_inverse - found[k]).abs() < 1e-12);
         }
+    }
+
+    /// The ways around a decomposition that does not converge give the matrix again.
+    #[test]
+    fn every_way_gives_the_matrix_again() {
+        let a = Mat::from_fn(5, 3, |i, j| ((3 * i + 7 * j * j + i * j) as f64).sin());
+        let ways = [
+            Svd::directly(a.as_ref()).unwrap(),
+            Svd::directly(a.transpose()).map(Svd::transposed).unwrap(),
+            Svd::directly(a.as_ref().reverse_rows()).map(Svd::with_reversed_rows).unwrap(),
+        ];
+        for way in ways {
+            let scaled = Mat::from_fn(5, 3, |i, k| way.left()[(i, k)] * way.singular_values[k]);
+            let difference = scaled * way.right().transpose() - &a;
+            assert!(difference.norm_max() < 1e-14, "{difference:?}");
+        }
+        let mut broken = a;
+        broken[(2, 1)] = f64::NAN;
+        assert!(matches!(Svd::of(broken.as_ref()), Err(IdentifyError::Decomposition)));
     }
 
     /// The third column is the sum of the first two; of all solutions, the one of least norm is returned. A matrix
