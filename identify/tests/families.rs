@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use abbe_identify::fit::{SessionFit, report};
+use abbe_identify::SessionFit;
+use abbe_identify::fit::report;
 use abbe_identify::problem::Problem;
 use abbe_identify::trace::{TraceOptions, TraceOutcome, trace};
 use abbe_model::files::{self, ReadOptions};

@@ -346,6 +346,9 @@ fn values(result: &TraceResult) -> Table {
             for value in &number.values {
                 figures.figure(&section, &number.name, "", *value, &number.unit);
             }
+            for end in number.intervals_95.iter().flatten().flatten() {
+                figures.figure(&section, &format!("{}, end of the 95 % interval", number.name), "", *end, &number.unit);
+            }
         }
         figures.parameters(&section, &effect.parameters);
         if let Some(prior) = &effect.prior {

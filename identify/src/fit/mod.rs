@@ -35,6 +35,7 @@ pub use aliases::{AliasChange, EffectAliases};
 pub use assume::assume;
 pub(crate) use covariance::{null_space, of_parameters as covariance_of_parameters};
 pub use numbers::NumberInterval;
+pub(crate) use numbers::QUANTILE_95;
 pub use prepare::{prepare, with_lever};
 pub(crate) use prepare::{prepare_with, refit, with_families, with_families_linearised};
 pub(crate) use quantities::{Quantity, quantities, values_at};

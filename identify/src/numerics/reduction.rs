@@ -86,6 +86,19 @@ pub fn inverse_of_upper(r: MatRef<'_, f64>) -> Mat<f64> {
     inverse
 }
 
+/// Orthonormal columns of the space of the columns of a matrix, by pivoting. `negligible` is the share of the first pivot
+/// below which a pivot is a rounding error.
+pub(crate) fn orthonormal_basis(matrix: &Mat<f64>, negligible: f64) -> Mat<f64> {
+    if matrix.nrows() == 0 || matrix.ncols() == 0 {
+        return Mat::zeros(matrix.nrows(), 0);
+    }
+    let decomposed = matrix.col_piv_qr();
+    let r = decomposed.thin_R();
+    let least = negligible * r[(0, 0)].abs();
+    let rank = (0..r.nrows()).take_while(|k| r[(*k, *k)].abs() > least).count();
+    decomposed.compute_thin_Q().subcols(0, rank).to_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

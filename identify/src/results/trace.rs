@@ -133,13 +133,18 @@ pub struct LargestOrder {
     pub p_value: f64,
 }
 
-/// A number in an effect's shape that is chosen on a grid. It has no uncertainty.
+/// A number in an effect's shape as the search tunes it. Those that a fit estimates are among the parameters too, with their
+/// uncertainties.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ShapeParameter {
     /// `period`, `time constant`, `width`, `centre`, or `at` for the positions of steps.
     pub name: String,
     /// One value, or one for each position.
     pub values: Vec<f64>,
+    /// For the positions of the steps of a found effect their 95 % intervals by the profile likelihood, in `unit`; `null`
+    /// where the readings do not bound the position.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub intervals_95: Vec<Option<[f64; 2]>>,
     /// Unit of the driver: mm, deg, s, K, m.
     pub unit: String,
 }

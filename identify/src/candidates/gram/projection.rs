@@ -18,6 +18,7 @@ use faer::{Accum, Mat, MatRef, Par};
 use super::{Gram, stored, transposed_product};
 use crate::candidates::columns::{Adjoint, EffectColumns, TrainingRows};
 use crate::error::IdentifyError;
+use crate::numerics::reduction::orthonormal_basis;
 use crate::numerics::symmetric::pseudo_inverse;
 
 /// Share of the largest entry below which a pivot of the model rows of a fold is a rounding error.
@@ -329,14 +330,7 @@ impl LeftOut {
 
 /// `Q` and `R` of a matrix, without the columns of `Q` that are rounding errors.
 fn reduced(matrix: &Mat<f64>) -> (Mat<f64>, Mat<f64>) {
-    if matrix.nrows() == 0 || matrix.ncols() == 0 {
-        return (Mat::zeros(matrix.nrows(), 0), Mat::zeros(0, matrix.ncols()));
-    }
-    let decomposed = matrix.col_piv_qr();
-    let r = decomposed.thin_R();
-    let least = PIVOT_ROUNDING * r[(0, 0)].abs();
-    let rank = (0..r.nrows()).take_while(|k| r[(*k, *k)].abs() > least).count();
-    let q = decomposed.compute_thin_Q().subcols(0, rank).to_owned();
+    let q = orthonormal_basis(matrix, PIVOT_ROUNDING);
     // R of the columns in their own order.
     let r = q.transpose() * matrix;
     (q, r)

@@ -6,8 +6,10 @@ use abbe_model::session::Prior;
 
 use super::curve::{curve_of, curve_units};
 use super::prediction::Predictions;
+use super::steps;
 use super::{HeldOut, TraceFindings};
 use crate::candidates::library::Family;
+use crate::error::IdentifyError;
 use crate::fit::Fit;
 use crate::fit::families::effective_parameters;
 use crate::parameters::{Parameter, Role};
@@ -60,14 +62,14 @@ pub(super) fn result(
     families: &[Family],
     held_out: &HeldOut<'_>,
     found: &Found<'_>,
-) -> EffectResult {
+) -> Result<EffectResult, IdentifyError> {
     let (after, search) = (found.after, findings.search);
     let taken = search.selected()[found.number];
     let candidate = &search.candidates[found.candidate];
     let number = found.number + findings.before.parameters.effects.len();
-    let described = described(after, found.after_fit, number, found.parameters);
+    let described = described(after, found.after_fit, number, found.parameters)?;
     let aliases: Vec<&Effect> = found.alias_effects.iter().collect();
-    EffectResult {
+    Ok(EffectResult {
         family: families.get(candidate.family).map(|family| family.name.clone()).unwrap_or_default(),
         p_value: taken.p_value,
         rms_gain_um: found.rms_gain_um,
@@ -78,7 +80,7 @@ pub(super) fn result(
             None => Vec::new(),
         },
         ..explained_by(described, after, &candidate.effect, &aliases, found.costs)
-    }
+    })
 }
 
 /// The result of an effect with its aliases. `costs` are the increases of χ² and of the prior cost by each of these in its
@@ -96,7 +98,7 @@ pub(super) fn explained_by(
     let ratio = |logarithm: f64| logarithm.min(LARGEST_EXPONENT).exp();
     let alias = |(effect, [delta_chi2, prior_cost]): (&&Effect, &[f64; 2])| AliasResult {
         name: effect_name(machine, effect),
-        shape_parameters: shape_parameters_of(problem, effect),
+        shape_parameters: shape_parameters_of(problem, effect, &[]),
         delta_chi2: *delta_chi2,
         likelihood_ratio: ratio(-0.5 * delta_chi2),
         prior_cost: *prior_cost,
@@ -112,15 +114,24 @@ pub(super) fn explained_by(
 }
 
 /// The `number`-th effect of a fitted problem without the results of a search: name, numbers, parameters, prior, curve.
-pub(super) fn described(problem: &Problem, fit: &Fit, number: usize, parameters: &[ParameterResult]) -> EffectResult {
+///
+/// # Errors
+/// If the model cannot be evaluated.
+pub(super) fn described(
+    problem: &Problem,
+    fit: &Fit,
+    number: usize,
+    parameters: &[ParameterResult],
+) -> Result<EffectResult, IdentifyError> {
     let (machine, effect) = (&problem.session.machine, &problem.parameters.effects[number]);
     let (curve_at_unit, curve_unit) = curve_units(problem, effect);
     let meaning = meaning(machine, effect);
-    EffectResult {
+    let intervals = steps::intervals(problem, fit, number)?;
+    Ok(EffectResult {
         reading_unit: problem.unit(),
         name: effect_name(machine, effect),
         family: String::new(),
-        shape_parameters: shape_parameters_of(problem, effect),
+        shape_parameters: shape_parameters_of(problem, effect, &intervals),
         parameters: parameters_of(problem, parameters, number),
         prior: prior_of(problem, fit, number),
         curve: curve_of(problem, fit, number),
@@ -138,7 +149,7 @@ pub(super) fn described(problem: &Problem, fit: &Fit, number: usize, parameters:
         separated_by: None,
         separation: None,
         separating_tests: Vec::new(),
-    }
+    })
 }
 
 /// The prior of the coefficients of the `number`-th effect; `None` without one.
@@ -189,12 +200,13 @@ fn parameters_of(problem: &Problem, parameters: &[ParameterResult], number: usiz
     parameters.iter().filter(is_own).cloned().collect()
 }
 
-/// The numbers and positions of the shape of an effect.
-fn shape_parameters_of(problem: &Problem, effect: &Effect) -> Vec<ShapeParameter> {
+/// The numbers and positions of the shape of an effect, with the intervals of the positions.
+fn shape_parameters_of(problem: &Problem, effect: &Effect, of_positions: &[Option<[f64; 2]>]) -> Vec<ShapeParameter> {
     let unit = effect.driver_unit(&problem.session.machine);
     let number = |(name, values): (&str, Vec<f64>)| ShapeParameter {
         name: name.to_string(),
         values: values.into_iter().map(|value| unit.to_display(value)).collect(),
+        intervals_95: of_positions.iter().map(|ends| ends.map(|ends| ends.map(|end| unit.to_display(end)))).collect(),
         // The number of a lag is its time constant.
         unit: if effect.shape.lag_s().is_some() { "s" } else { unit.result }.to_string(),
     };

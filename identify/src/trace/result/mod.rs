@@ -5,6 +5,7 @@ mod effect;
 mod poses;
 mod prediction;
 mod rejected;
+mod steps;
 mod unsearched;
 mod verdict;
 
@@ -112,7 +113,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
             };
             effect::result(findings, &families, &held_out, &reported)
         })
-        .collect();
+        .collect::<Result<_, _>>()?;
     let mut warnings = before.session.warnings.clone();
     warnings.extend(noise::stated_against_repeats(before, &before_fit.residuals));
     warnings.extend(mislabelled_runs(&before.tests));

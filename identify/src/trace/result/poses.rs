@@ -49,14 +49,17 @@ pub(in crate::trace) fn outcome_of_poses(
     Determined::of(&after, &after_fit.rank)?.mark(&after, &mut after_result.parameters, after_result.goodness);
     let declared = before.parameters.effects.len();
     let effects: Vec<EffectResult> = (accepted.iter().enumerate())
-        .map(|(k, accepted)| EffectResult {
-            family: accepted.group.to_string(),
-            p_value: accepted.p_value,
-            heldout_rms_um: accepted.heldout_rms_mm * 1e3,
-            rms_gain_um: rms_gain_mm(&after, &after_fit, declared + k) * 1e3,
-            ..with_aliases(described(&after, &after_fit, declared + k, &after_result.parameters), &after, accepted)
+        .map(|(k, accepted)| {
+            let described = described(&after, &after_fit, declared + k, &after_result.parameters)?;
+            Ok(EffectResult {
+                family: accepted.group.to_string(),
+                p_value: accepted.p_value,
+                heldout_rms_um: accepted.heldout_rms_mm * 1e3,
+                rms_gain_um: rms_gain_mm(&after, &after_fit, declared + k) * 1e3,
+                ..with_aliases(described, &after, accepted)
+            })
         })
-        .collect();
+        .collect::<Result<_, IdentifyError>>()?;
     let steps = (accepted.iter().enumerate())
         .map(|(k, accepted)| SearchStep {
             id: accepted.effect.id(),
