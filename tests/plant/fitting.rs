@@ -55,7 +55,7 @@ impl Oracle {
     }
 
     /// Reading minus plant, µm, for values of parameters and amplitudes in the order of [`Fit::ids`].
-    fn residuals_um(&self, rows: &[Row], values: &[f64], effects: &[Injected]) -> DVector<f64> {
+    pub(super) fn residuals_um(&self, rows: &[Row], values: &[f64], effects: &[Injected]) -> DVector<f64> {
         let (unknowns, amplitudes) = values.split_at(self.plan.unknowns.len());
         let effects: Vec<Injected> = effects
             .iter()

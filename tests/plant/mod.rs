@@ -32,6 +32,7 @@ pub mod pose;
 pub mod recipe;
 pub mod robot;
 pub mod rtest;
+pub mod scan;
 pub mod schedule;
 pub mod spindle;
 pub mod whitening;
@@ -45,6 +46,7 @@ pub use noise::Noise;
 pub use oracle::{Alias, Oracle};
 pub use plan::Plan;
 pub use recipe::{Recipe, SimulatedSession, Truth};
+pub use scan::{Detected, Scan};
 pub use spindle::Spindle;
 
 mod check_effects;

@@ -19,6 +19,7 @@ mod gate;
 mod numbers;
 mod outside;
 mod pairs;
+mod power;
 mod robots;
 mod single;
 mod speed;

@@ -5,7 +5,8 @@ use super::rates::Rate;
 use super::sessions::{TracedSession, at_multiple, case, oracle, random, run, sessions, skipped, verbose};
 use crate::plant::{Injected, Kind, Noise};
 
-fn pair(number: usize) -> (Kind, Noise, Vec<Injected>) {
+/// Kind, noise and both effects of a session.
+pub fn pair(number: usize) -> (Kind, Noise, Vec<Injected>) {
     let (kind, noise) = case(number);
     let oracle = oracle(kind, noise);
     let pair = oracle.random_pair(1.0, &mut random(11, number));

@@ -133,6 +133,7 @@ pub fn traced(draw: &SimulatedSession, session_number: usize) -> (TraceResult, f
     }
     let start = Instant::now();
     let read = session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
-    let found = trace(&read, &TraceOptions::default(), &|_| true).unwrap();
+    let found = trace(&read, &TraceOptions::default(), &|_| true)
+        .unwrap_or_else(|error| panic!("session {session_number}: {error}"));
     (found.result, start.elapsed().as_secs_f64())
 }

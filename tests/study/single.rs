@@ -3,16 +3,19 @@
 use super::judging::{Numbers, found, is, pulls, summary, surplus_aliases};
 use super::rates::{Pulls, Rate};
 use super::sessions::{TracedSession, at_multiple, case, oracle, random, run, sessions, skipped, verbose};
-use crate::plant::named;
+use crate::plant::{Injected, Kind, Noise, named};
+
+/// Kind and noise of a session, and its effect at a multiple of the smallest significant size.
+pub fn at_multiple_of_smallest(factor: f64, number: usize) -> (Kind, Noise, Vec<Injected>) {
+    let (kind, noise) = case(number);
+    let oracle = oracle(kind, noise);
+    let effect = oracle.random_detectable(1.0, &mut random(factor as u64, number));
+    let effect = at_multiple(&oracle, &effect, factor);
+    (kind, noise, vec![effect])
+}
 
 fn study(factor: f64) -> Vec<TracedSession> {
-    run(0..sessions(), |number| {
-        let (kind, noise) = case(number);
-        let oracle = oracle(kind, noise);
-        let effect = oracle.random_detectable(1.0, &mut random(factor as u64, number));
-        let effect = at_multiple(&oracle, &effect, factor);
-        (kind, noise, vec![effect])
-    })
+    run(0..sessions(), |number| at_multiple_of_smallest(factor, number))
 }
 
 /// An alias lies within 2 σ of the named effect with noise. One that is more than 4 σ behind without noise does so in

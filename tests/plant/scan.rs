@@ -1,0 +1,217 @@
+//! Detectors that know more than a trace can: bounds for its power at the same rate of false claims.
+//!
+//! Both know the noise, the outliers and the positions, widths and time constants of the truth. The *matched* detector
+//! knows the effect too, and tests it alone. The *scan* searches the catalogue; the null distribution of its best score
+//! comes from draws of white noise, and entries whose gain is within 2 σ of the best are named beside it.
+//!
+//! [`Scan::selective_p_value`] is the exact p-value of the first step of forward stepwise regression, given that this
+//! entry was selected: the tail of a truncated χ distribution (Loftus and Taylor, *A significance test for forward
+//! stepwise model selection*, 2014).
+
+use nalgebra::{DMatrix, DVector};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64Mcg;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::effect::Injected;
+use super::families;
+use super::naming::named;
+use super::oracle::{Oracle, WEAK_U};
+use super::recipe::{Row, SimulatedSession};
+use super::whitening::whiten;
+
+/// Draws of the null distribution of the scan, as a trace has.
+const DRAWS: usize = 199;
+
+/// Probability of a false claim.
+const LEVEL: f64 = 0.01;
+
+/// Smallest share of a column that remains after the projection on the model.
+const MIN_SHARE: f64 = 1e-3;
+
+/// Gain of the best entry in excess of that of the truth up to which the truth is named beside it.
+const NAMED_BESIDE: f64 = 4.0;
+
+/// The whitened residual of a session and the responses of all entries, both orthogonal to the parameters.
+pub struct Scan {
+    residual: DVector<f64>,
+    /// Orthonormal columns of each entry; none if it is not identifiable.
+    responses: Vec<DMatrix<f64>>,
+    /// Places of the true effects among the entries.
+    truths: Vec<usize>,
+    parameter_space: DMatrix<f64>,
+}
+
+/// What the detectors made of a session.
+#[derive(Clone, Copy, Debug)]
+pub struct Detected {
+    /// Every true effect is significant for the detector that knows it and the others.
+    pub matched: bool,
+    /// Every true effect is named by the scan.
+    pub scanned: bool,
+    /// Number of claims of the scan.
+    pub claims: usize,
+}
+
+/// −ln of the probability that noise has this gain.
+fn score(gain: f64, freedom: usize) -> f64 {
+    let tail = ChiSquared::new(freedom.max(1) as f64).unwrap().sf(gain);
+    if tail > 0.0 { -tail.ln() } else { 0.5 * gain }
+}
+
+fn orthonormal(columns: &DMatrix<f64>, lengths: &[f64]) -> DMatrix<f64> {
+    let mut basis: Vec<DVector<f64>> = Vec::new();
+    for (column, length) in columns.column_iter().zip(lengths) {
+        let mut rest = column.into_owned();
+        for _ in 0..2 {
+            for other in &basis {
+                rest -= other * other.dot(&rest);
+            }
+        }
+        let norm = rest.norm();
+        if norm > MIN_SHARE * length && norm > 1e-6 {
+            basis.push(rest / norm);
+        }
+    }
+    if basis.is_empty() { DMatrix::zeros(columns.nrows(), 0) } else { DMatrix::from_columns(&basis) }
+}
+
+impl Scan {
+    /// The scan of a session for the entries of the catalogue with the numbers of the true effects. A session without
+    /// effects takes them from `like`.
+    pub fn of(oracle: &Oracle, draw: &SimulatedSession, like: &[Injected]) -> Scan {
+        let rows: Vec<Row> = draw.rows.iter().copied().filter(|row| !row.outlier).collect();
+        let places: Vec<usize> = rows.iter().map(|row| row.instant).collect();
+        let unknowns = &oracle.plan.unknowns;
+        let whitened = |columns: DMatrix<f64>| {
+            let whitened = whiten(&oracle.plan, oracle.noise, &places, columns);
+            whitened.insert_rows(rows.len(), unknowns.len(), 0.0)
+        };
+        let mut base = whitened(oracle.base.select_rows(&places));
+        let u = |k: usize| unknowns[k].prior_u_um.unwrap_or(WEAK_U);
+        (0..unknowns.len()).for_each(|k| base[(rows.len() + k, k)] = 1.0 / u(k));
+        let parameter_space = base.qr().q();
+
+        let fit = oracle.fit(draw, &[]);
+        let residual = oracle.residuals_um(&rows, &fit.values, &[]);
+        let mut residual =
+            whitened(DMatrix::from_column_slice(rows.len(), 1, residual.as_slice())).column(0).into_owned();
+        (0..unknowns.len()).for_each(|k| residual[rows.len() + k] = -fit.values[k] / u(k));
+        residual -= &parameter_space * parameter_space.tr_mul(&residual);
+
+        let mut entries: Vec<Injected> = draw.truth.effects.clone();
+        let truths = (0..entries.len()).collect();
+        for other in like.iter().flat_map(|like| families::catalogue(oracle.plan.kind, like)) {
+            if entries.iter().all(|entry| named(entry) != named(&other)) {
+                entries.push(other);
+            }
+        }
+        let responses = entries.iter().map(|entry| {
+            let columns = whitened(oracle.columns(entry).select_rows(&places));
+            let lengths: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
+            let mut projected = columns;
+            for _ in 0..2 {
+                projected -= &parameter_space * parameter_space.tr_mul(&projected);
+            }
+            orthonormal(&projected, &lengths)
+        });
+        Scan { residual, responses: responses.collect(), truths, parameter_space }
+    }
+
+    /// Gain and freedom of each entry.
+    fn gains(&self, residual: &DVector<f64>) -> Vec<(f64, usize)> {
+        self.responses.iter().map(|q| (q.tr_mul(residual).norm_squared(), q.ncols())).collect()
+    }
+
+    fn best(gains: &[(f64, usize)]) -> Option<(usize, f64)> {
+        let scores = gains.iter().enumerate().filter(|(_, (_, freedom))| *freedom > 0);
+        scores.map(|(k, (gain, freedom))| (k, score(*gain, *freedom))).max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// Adds an entry to the model.
+    fn project_out(&mut self, entry: usize) {
+        let q = self.responses[entry].clone();
+        self.residual -= &q * q.tr_mul(&self.residual);
+        for response in &mut self.responses {
+            let rest = &*response - &q * q.tr_mul(response);
+            *response = orthonormal(&rest, &vec![1.0; rest.ncols()]);
+        }
+    }
+
+    /// What the matched detector and the scan make of the session.
+    pub fn detect(mut self, seed: u64) -> Detected {
+        let mut matched = true;
+        for truth in self.truths.clone() {
+            let mut others = Scan {
+                residual: self.residual.clone(),
+                responses: self.truths.iter().map(|k| self.responses[*k].clone()).collect(),
+                truths: Vec::new(),
+                parameter_space: DMatrix::zeros(0, 0),
+            };
+            (0..self.truths.len()).filter(|k| *k != truth).for_each(|k| others.project_out(k));
+            let (gain, freedom) = others.gains(&others.residual)[truth];
+            matched &= freedom > 0 && score(gain, freedom) >= -LEVEL.ln();
+        }
+        let mut random = Pcg64Mcg::seed_from_u64(seed);
+        let (mut claims, mut named) = (0, vec![false; self.truths.len()]);
+        // One claim more than there are effects shows whether the scan goes on.
+        while claims <= self.truths.len() {
+            let gains = self.gains(&self.residual);
+            let Some((best, found)) = Scan::best(&gains) else { break };
+            let above = (0..DRAWS).filter(|_| self.null_best(&mut random) >= found).count();
+            if (above + 1) as f64 > LEVEL * (DRAWS + 1) as f64 {
+                break;
+            }
+            claims += 1;
+            for (named, truth) in named.iter_mut().zip(&self.truths) {
+                *named |= gains[best].0 - gains[*truth].0 <= NAMED_BESIDE && gains[*truth].1 > 0;
+            }
+            self.project_out(best);
+        }
+        Detected { matched, scanned: named.iter().all(|named| *named), claims }
+    }
+
+    /// The best score of white noise.
+    fn null_best(&self, random: &mut Pcg64Mcg) -> f64 {
+        let noise = DVector::from_fn(self.residual.len(), |_, _| StandardNormal.sample(random));
+        let noise = &noise - &self.parameter_space * self.parameter_space.tr_mul(&noise);
+        Scan::best(&self.gains(&noise)).map_or(0.0, |(_, score)| score)
+    }
+
+    /// The probability of a larger norm of the response to the best entry, given that this entry is the best and given
+    /// the residual beside its direction, in a session without an effect. The second value is whether the truth is named.
+    pub fn selective_p_value(&self) -> (f64, bool) {
+        const STEP: f64 = 0.02;
+        let gains = self.gains(&self.residual);
+        let Some((best, _)) = Scan::best(&gains) else { return (1.0, false) };
+        let (gain, freedom) = gains[best];
+        let length = gain.sqrt();
+        let q = &self.responses[best];
+        let direction = q * q.tr_mul(&self.residual) / length;
+        let rest = &self.residual - &direction * length;
+        let coordinates: Vec<(DVector<f64>, DVector<f64>)> =
+            self.responses.iter().map(|q| (q.tr_mul(&rest), q.tr_mul(&direction))).collect();
+        // ln of the density of χ, without its constant, relative to that at the found length.
+        let density = |t: f64| ((freedom as f64 - 1.0) * (t / length).ln() - 0.5 * (t * t - gain)).exp();
+        let selected = |t: f64| {
+            let own = score(t * t, freedom);
+            coordinates.iter().enumerate().all(|(k, (rest, along))| {
+                k == best || along.is_empty() || score((rest + along * t).norm_squared(), along.len()) <= own
+            })
+        };
+        let (mut total, mut above) = (0.0, 0.0);
+        for k in 0..((length + 8.0) / STEP) as usize {
+            let t = (k as f64 + 0.5) * STEP;
+            let weight = density(t);
+            // Beyond these lengths the density does not count.
+            if weight < 1e-9 && t > length || !selected(t) {
+                continue;
+            }
+            total += weight;
+            above += if t > length { weight } else { 0.0 };
+        }
+        let named = self.truths.iter().all(|truth| gain - gains[*truth].0 <= NAMED_BESIDE && gains[*truth].1 > 0);
+        (if total > 0.0 { above / total } else { 1.0 }, named)
+    }
+}

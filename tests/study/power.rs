@@ -1,0 +1,129 @@
+//! The power of the trace as a share of that of detectors that know more, on the same readings at the same rate of false
+//! claims; and p-values of selective inference beside those of the null draws.
+
+use std::fmt::Write;
+
+use rayon::prelude::*;
+
+use super::judging::found;
+use super::pairs::pair;
+use super::rates::Rate;
+use super::sessions::{TracedSession, case, oracle, random, run, sessions, skipped, verbose};
+use super::single::at_multiple_of_smallest;
+use crate::plant::{Driver, Injected, Scan, Shape};
+
+/// Prints the power of the trace and of the detectors, and returns their shares.
+fn compare(title: &str, outcomes: &[TracedSession]) -> [f64; 3] {
+    let detected = outcomes.par_iter().map(|outcome| {
+        let oracle = oracle(outcome.kind, outcome.noise);
+        Scan::of(&oracle, &outcome.draw, &outcome.draw.truth.effects).detect(outcome.number as u64)
+    });
+    let detected: Vec<_> = detected.collect();
+    let [mut own, mut matched, mut scanned, mut more] = [Rate::default(); 4];
+    for (outcome, detected) in outcomes.iter().zip(&detected) {
+        let truths = &outcome.draw.truth.effects;
+        let named = truths.iter().all(|truth| found(outcome, truth).is_some());
+        own.count(named);
+        matched.count(detected.matched);
+        scanned.count(detected.scanned);
+        more.count(detected.claims > truths.len());
+        if verbose() && named != detected.scanned {
+            println!("{} {:?}: trace {named}, {detected:?}, {truths:?}", outcome.number, outcome.noise);
+        }
+    }
+    // The scan knows the positions and heights of all steps, of which a trace has to choose each.
+    let steps = |effects: &[Injected]| effects.iter().any(|effect| matches!(effect.shape, Shape::Steps { .. }));
+    let slow =
+        |effects: &[Injected]| effects.iter().any(|effect| matches!(effect.driver, Driver::Time | Driver::Temperature));
+    let classes: [(&str, &dyn Fn(&[Injected]) -> bool); 3] = [
+        ("with steps", &steps),
+        ("of time or temperature", &|effects| slow(effects) && !steps(effects)),
+        ("others", &|effects| !slow(effects) && !steps(effects)),
+    ];
+    let mut of_classes = String::new();
+    for (class, is_in) in classes {
+        let [mut own, mut scanned] = [Rate::default(); 2];
+        for (outcome, detected) in outcomes.iter().zip(&detected) {
+            let truths = &outcome.draw.truth.effects;
+            if is_in(truths) {
+                own.count(truths.iter().all(|truth| found(outcome, truth).is_some()));
+                scanned.count(detected.scanned);
+            }
+        }
+        let _ = writeln!(of_classes, "| {class}: trace; scan | {own}; {scanned} |");
+    }
+    let [own_share, matched_share, scanned_share] = [own, matched, scanned].map(Rate::share);
+    println!(
+        "| {title} | |\n|---|---|\n| named by the trace | {own} |\n| significant for a detector that knows the effect | \
+         {matched} |\n| named by a scan that knows noise and numbers | {scanned} |\n| more than the true effects by the \
+         scan | {more} |\n{of_classes}| trace over matched, over scan | {:.3}, {:.3} |",
+        own_share / matched_share,
+        own_share / scanned_share
+    );
+    [own_share, matched_share, scanned_share]
+}
+
+#[test]
+fn power_is_a_share_of_that_of_detectors_that_know_more() {
+    if skipped("power_is_a_share_of_that_of_detectors_that_know_more") {
+        return;
+    }
+    for (title, outcomes) in [
+        ("one effect at twice", run(0..sessions(), |number| at_multiple_of_smallest(2.0, number))),
+        ("one effect at five times", run(0..sessions(), |number| at_multiple_of_smallest(5.0, number))),
+        ("two effects at five times", run(0..sessions(), pair)),
+    ] {
+        let [_, matched, scanned] = compare(title, &outcomes);
+        // A detector that knows the effect misses at most what its level costs at 5.6 standard deviations.
+        assert!(matched >= 0.97 && matched >= scanned - 0.01, "{title}: {matched}, {scanned}");
+    }
+}
+
+/// Without an effect, and with one at twice the smallest size: claims at 1 % by the p-value of selective inference, by
+/// the null distribution of the scan, and by the trace.
+#[test]
+fn selective_inference_beside_null_draws() {
+    if skipped("selective_inference_beside_null_draws") {
+        return;
+    }
+    let null = run(0..sessions(), |number| {
+        let (kind, noise) = case(number);
+        (kind, noise, Vec::new())
+    });
+    let twice = run(0..sessions(), |number| at_multiple_of_smallest(2.0, number));
+    for (title, outcomes) in [("no effect", null), ("one effect at twice", twice)] {
+        let judged: Vec<_> = outcomes
+            .par_iter()
+            .map(|outcome| {
+                let oracle = oracle(outcome.kind, outcome.noise);
+                let truths = &outcome.draw.truth.effects;
+                let like = match truths.is_empty() {
+                    true => vec![oracle.random_detectable(1.0, &mut random(2, outcome.number))],
+                    false => truths.clone(),
+                };
+                let scan = Scan::of(&oracle, &outcome.draw, &like);
+                let (p_value, named) = scan.selective_p_value();
+                (p_value, named, scan.detect(outcome.number as u64))
+            })
+            .collect();
+        let rate = |hit: &dyn Fn(usize) -> bool| {
+            let mut rate = Rate::default();
+            (0..outcomes.len()).for_each(|k| rate.count(hit(k)));
+            rate
+        };
+        let below = |level: f64| rate(&|k| judged[k].0 <= level);
+        println!("| {title} | |\n|---|---|");
+        for level in [0.01, 0.05, 0.1, 0.5] {
+            println!("| selective p-value at most {level} | {} |", below(level));
+        }
+        println!("| the same at most 0.01, and the truth named | {} |", rate(&|k| judged[k].0 <= 0.01 && judged[k].1));
+        println!("| claimed by the scan with null draws | {} |", rate(&|k| judged[k].2.claims > 0));
+        println!("| claimed by the trace | {} |", rate(&|k| !outcomes[k].result.effects.is_empty()));
+        if title == "no effect" {
+            for level in [0.05, 0.5] {
+                let (found, slack) = (below(level), 3.0 * (level * (1.0 - level) / outcomes.len() as f64).sqrt());
+                assert!((found.share() - level).abs() <= slack + 0.5 / outcomes.len() as f64, "{level}: {found}");
+            }
+        }
+    }
+}
