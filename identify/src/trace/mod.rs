@@ -246,7 +246,7 @@ fn with_noise_model(problem: &mut Problem, found: Fit) -> Result<Fit, IdentifyEr
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn structure_of_fit(problem: &Problem, fit: &Fit, seed: u64) -> Result<Option<Structure>, IdentifyError> {
+pub(crate) fn structure_of_fit(problem: &Problem, fit: &Fit, seed: u64) -> Result<Option<Structure>, IdentifyError> {
     let options = TraceOptions { seed, ..TraceOptions::default() };
     let mut problem = problem.clone();
     let fit = with_noise_model(&mut problem, fit.clone())?;
