@@ -13,7 +13,7 @@ use super::noise::Noise;
 use super::plan::Plan;
 use super::recipe::Recipe;
 use super::whitening::{rows_of, whiten};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 use rand::Rng;
 use std::collections::HashMap;
 
@@ -102,23 +102,10 @@ impl Oracle {
     /// Orthonormal basis of the response to several effects that the parameters do not explain; no column if none is
     /// identifiable.
     fn response(&self, effects: &[Injected]) -> DMatrix<f64> {
-        let mut basis: Vec<DVector<f64>> = Vec::new();
-        for effect in effects {
-            let (projected, lengths) = self.projected(effect);
-            for (column, length) in projected.column_iter().zip(lengths) {
-                let mut rest = column.into_owned();
-                for _ in 0..2 {
-                    for other in &basis {
-                        rest -= other * other.dot(&rest);
-                    }
-                }
-                let norm = rest.norm();
-                if norm > MIN_REMAINING_SHARE * length && norm > MIN_SIGNATURE {
-                    basis.push(rest / norm);
-                }
-            }
-        }
-        if basis.is_empty() { DMatrix::zeros(self.parameter_space.nrows(), 0) } else { DMatrix::from_columns(&basis) }
+        let parts: Vec<(DMatrix<f64>, Vec<f64>)> = effects.iter().map(|effect| self.projected(effect)).collect();
+        let columns: Vec<_> = parts.iter().flat_map(|(projected, _)| projected.column_iter()).collect();
+        let lengths: Vec<f64> = parts.iter().flat_map(|(_, lengths)| lengths).copied().collect();
+        orthonormal(self.parameter_space.nrows(), columns.into_iter().zip(lengths))
     }
 
     /// The amplitude, in [`Injected::unit`], at which the expected test statistic of the effect reaches the critical
@@ -233,6 +220,25 @@ impl Oracle {
             }
         }
     }
+}
+
+/// Orthonormal columns of the space of projected columns, each with its length before the projection, without those of which
+/// nothing remains.
+pub(super) fn orthonormal<'c>(rows: usize, columns: impl Iterator<Item = (DVectorView<'c, f64>, f64)>) -> DMatrix<f64> {
+    let mut basis: Vec<DVector<f64>> = Vec::new();
+    for (column, length) in columns {
+        let mut rest = column.into_owned();
+        for _ in 0..2 {
+            for other in &basis {
+                rest -= other * other.dot(&rest);
+            }
+        }
+        let norm = rest.norm();
+        if norm > MIN_REMAINING_SHARE * length && norm > MIN_SIGNATURE {
+            basis.push(rest / norm);
+        }
+    }
+    if basis.is_empty() { DMatrix::zeros(rows, 0) } else { DMatrix::from_columns(&basis) }
 }
 
 /// Largest permitted collinearity of two effects of one session: cosine of the angle between the responses, in both

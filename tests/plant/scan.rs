@@ -17,7 +17,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::effect::Injected;
 use super::families;
 use super::naming::named;
-use super::oracle::{Oracle, WEAK_U};
+use super::oracle::{Oracle, WEAK_U, orthonormal};
 use super::recipe::{Row, SimulatedSession};
 use super::whitening::whiten;
 
@@ -26,9 +26,6 @@ const DRAWS: usize = 199;
 
 /// Probability of a false claim.
 const LEVEL: f64 = 0.01;
-
-/// Smallest share of a column that remains after the projection on the model.
-const MIN_SHARE: f64 = 1e-3;
 
 /// Gain of the best entry in excess of that of the truth up to which the truth is named beside it.
 const NAMED_BESIDE: f64 = 4.0;
@@ -58,23 +55,6 @@ pub struct Detected {
 fn score(gain: f64, freedom: usize) -> f64 {
     let tail = ChiSquared::new(freedom.max(1) as f64).unwrap().sf(gain);
     if tail > 0.0 { -tail.ln() } else { 0.5 * gain }
-}
-
-fn orthonormal(columns: &DMatrix<f64>, lengths: &[f64]) -> DMatrix<f64> {
-    let mut basis: Vec<DVector<f64>> = Vec::new();
-    for (column, length) in columns.column_iter().zip(lengths) {
-        let mut rest = column.into_owned();
-        for _ in 0..2 {
-            for other in &basis {
-                rest -= other * other.dot(&rest);
-            }
-        }
-        let norm = rest.norm();
-        if norm > MIN_SHARE * length && norm > 1e-6 {
-            basis.push(rest / norm);
-        }
-    }
-    if basis.is_empty() { DMatrix::zeros(columns.nrows(), 0) } else { DMatrix::from_columns(&basis) }
 }
 
 impl Scan {
@@ -114,7 +94,7 @@ impl Scan {
             for _ in 0..2 {
                 projected -= &parameter_space * parameter_space.tr_mul(&projected);
             }
-            orthonormal(&projected, &lengths)
+            orthonormal(projected.nrows(), projected.column_iter().zip(lengths))
         });
         Scan { residual, responses: responses.collect(), truths, parameter_space }
     }
@@ -135,7 +115,7 @@ impl Scan {
         self.residual -= &q * q.tr_mul(&self.residual);
         for response in &mut self.responses {
             let rest = &*response - &q * q.tr_mul(response);
-            *response = orthonormal(&rest, &vec![1.0; rest.ncols()]);
+            *response = orthonormal(rest.nrows(), rest.column_iter().map(|column| (column, 1.0)));
         }
     }
 
