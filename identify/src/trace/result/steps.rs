@@ -72,8 +72,9 @@ pub(super) fn intervals(problem: &Problem, fit: &Fit, number: usize) -> Result<V
 
 /// Orthonormal columns of the space of all columns but one.
 fn basis_without(model: MatRef<'_, f64>, left_out: usize) -> Mat<f64> {
-    let kept: Vec<usize> = (0..model.ncols()).filter(|j| *j != left_out && model.col(*j).norm_l2() > 0.0).collect();
-    let scaled = Mat::from_fn(model.nrows(), kept.len(), |i, k| model[(i, kept[k])] / model.col(kept[k]).norm_l2());
+    let lengths = (0..model.ncols()).filter(|j| *j != left_out).map(|j| (j, model.col(j).norm_l2()));
+    let kept: Vec<(usize, f64)> = lengths.filter(|(_, length)| *length > 0.0).collect();
+    let scaled = Mat::from_fn(model.nrows(), kept.len(), |i, k| model[(i, kept[k].0)] / kept[k].1);
     orthonormal_basis(&scaled, DEPENDENT)
 }
 
