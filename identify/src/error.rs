@@ -97,7 +97,9 @@ pub enum IdentifyError {
         diagnosis: String,
     },
     /// A matrix decomposition failed.
-    #[error("a matrix of the least-squares problem has entries that are not finite")]
+    #[error(
+        "a matrix of the least-squares problem has entries that are not finite, or its decomposition does not converge; check readings and set-up for values that are far too large"
+    )]
     Decomposition,
     /// A value is not written as name, number and unit.
     #[error("`{text}` {fault}; write name, number and unit as in `EY0A=35.3um`")]

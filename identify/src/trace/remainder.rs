@@ -300,12 +300,16 @@ mod tests {
     use abbe_model::files::{self, ReadOptions};
 
     use super::*;
-    use crate::fit::prepare;
+    use crate::fit::{Fit, prepare};
+
+    fn measured() -> (Problem, Fit) {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        prepare(&files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap()
+    }
 
     #[test]
     fn a_structure_test_can_be_interrupted() {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let (problem, fit) = prepare(&files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
+        let (problem, fit) = measured();
         let columns = Columns::new(&problem, &fit.beta);
         let start = Start::of(&problem, &columns, &fit).unwrap();
         let tested = |should_continue: bool| {
@@ -320,8 +324,7 @@ mod tests {
     /// Detectors that come in batches lead to the decision of all together.
     #[test]
     fn batches_of_detectors_find_the_same_structure() {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let (problem, fit) = prepare(&files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
+        let (problem, fit) = measured();
         let columns = Columns::new(&problem, &fit.beta);
         let start = Start::of(&problem, &columns, &fit).unwrap();
         let draw = |k: usize| (0..start.residual.len()).map(|i| ((i * (2 * k + 3)) as f64).sin()).collect();
