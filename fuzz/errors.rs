@@ -10,7 +10,6 @@ use abbe_apply::volumetric::{self, MachineWithErrors, functions};
 use abbe_identify::quantity::{self, Given};
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
-use abbe_model::files;
 use abbe_model::session::limits::LARGEST;
 
 const MACHINE: &str = "chain = \"w C A b Y X Z t\"\n[axis.C]\n[axis.A]\n[axis.X]\n[axis.Y]\n[axis.Z]\n";
@@ -24,7 +23,7 @@ fn as_file<T>(input: &[u8], work: impl FnOnce(&PathBuf, &Machine) -> T) -> T {
             let made = made.expect("a temporary folder");
             let file = made.path().join("machine.toml");
             fs::write(&file, MACHINE).expect("a file in a temporary folder");
-            let machine = files::machine(&file).expect("a machine");
+            let machine = abbe_files::machine(&file).expect("a machine");
             (made, machine)
         };
     }

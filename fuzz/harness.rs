@@ -1,15 +1,15 @@
-//! Fuzz functions for every reader of `abbe-model`: files, read as the command reads them.
+//! Fuzz functions for every reader of `abbe-files`: files, read as the command reads them.
 //!
 //! For any input the reader returns, a message refers to existing bytes, and accepted values are finite.
-//! `model/tests/corpus.rs` replays the corpus with these functions on every test run.
+//! `files/tests/corpus.rs` replays the corpus with these functions on every test run.
 
 use std::fs;
 use std::io::Write;
 use std::path::Path;
 
+use abbe_files::ReadOptions;
 use abbe_model::ModelError;
 use abbe_model::document::edit::SessionText;
-use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::{Session, planned};
 
 const MACHINE: &str = "chain = \"w C A b Y X Z t\"\n[axis.C]\n[axis.A]\n[axis.X]\n[axis.Y]\n[axis.Z]\n";
@@ -63,7 +63,7 @@ fn check_message(fault: &ModelError) {
 
 /// Reads the session of the folder. The numbers of an accepted session are finite.
 fn session_in(folder: &Path) -> Option<Session> {
-    let session = match files::session(&folder.join("session.toml"), &ReadOptions::default()) {
+    let session = match abbe_files::session(&folder.join("session.toml"), &ReadOptions::default()) {
         Ok(session) => session,
         Err(fault) => {
             check_message(&fault);
@@ -86,7 +86,7 @@ fn session_in(folder: &Path) -> Option<Session> {
 pub fn machine(input: &[u8]) {
     within(|folder| {
         put(folder, "other.toml", input);
-        match files::machine(&folder.join("other.toml")) {
+        match abbe_files::machine(&folder.join("other.toml")) {
             Ok(machine) => assert!(machine.axes.iter().flat_map(|axis| axis.direction).all(f64::is_finite)),
             Err(fault) => check_message(&fault),
         }

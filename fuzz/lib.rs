@@ -1,4 +1,4 @@
-//! The functions of the fuzz targets: readers of `abbe-model` and of `abbe-identify`.
+//! The functions of the fuzz targets: readers of `abbe-files` and of `abbe-identify`.
 
 pub mod errors;
 mod harness;

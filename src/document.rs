@@ -3,13 +3,13 @@
 
 use abbe_apply::compare::ComparisonStatement;
 use abbe_apply::compare::results::{Comparison, Difference};
+use abbe_files::SourceMap;
+use abbe_files::stamp::FileStamp;
 use abbe_identify::model_file::{InputFile, Provenance};
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{FitResult, Statements, TraceResult, ValidationStatement};
 use abbe_identify::trace::TraceOutcome;
 use abbe_identify::validate::results::{MovedParameter, ValidationResult};
-use abbe_model::files::SourceMap;
-use abbe_model::files::stamp::FileStamp;
 use abbe_plan::PlanStatement;
 use abbe_plan::results::{Contribution, PlanAnalysis};
 use schemars::JsonSchema;

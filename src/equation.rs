@@ -1,11 +1,11 @@
 //! The parameters of an equation by their names.
 
 use abbe_codegen::Variable;
+use abbe_files::{ReadOptions, Source, SourceMap};
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::effect::{Component, Effect};
 use abbe_model::error::ModelError;
-use abbe_model::files::{self, ReadOptions, Source, SourceMap};
 use abbe_model::instrument::InstrumentParameter;
 use abbe_model::pattern;
 use abbe_model::session::{Session, Test};
@@ -18,11 +18,11 @@ pub const WITHOUT_READINGS: &str = "the equation is made without readings: in a 
 /// # Errors
 /// If the session cannot be read without its readings either.
 pub fn session(source: &Source, options: &ReadOptions) -> Result<(Session, SourceMap, Option<ModelError>), ModelError> {
-    let fault = match files::session_of(source, options) {
+    let fault = match abbe_files::session_of(source, options) {
         Ok((session, sources)) => return Ok((session, sources, None)),
         Err(fault) => fault,
     };
-    match files::session_of(source, &ReadOptions { read_data: false, ..options.clone() }) {
+    match abbe_files::session_of(source, &ReadOptions { read_data: false, ..options.clone() }) {
         Ok((session, sources)) => Ok((session, sources, Some(fault))),
         Err(_) => Err(fault),
     }

@@ -9,12 +9,12 @@ use abbe_apply::export::kinematics::{ENTRIES, EntryChoice, KinematicTable};
 use abbe_apply::export::neutral::{self, AxisPlace};
 use abbe_apply::export::travel::Travel;
 use abbe_apply::export::{left_out, urdf, urdf_patch};
+use abbe_files::Source;
+use abbe_files::robot::dh::{self as table, Convention};
 use abbe_identify::IdentifyError;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::parameters::Role;
 use abbe_model::component::{ErrorKind, ErrorName};
-use abbe_model::files::Source;
-use abbe_model::files::robot::dh::{self as table, Convention};
 use schemars::JsonSchema;
 use serde::Serialize;
 

@@ -3,7 +3,7 @@
 //!
 //! ```no_run
 //! use abbe::import::{ImportOptions, Target, import};
-//! use abbe::model::files::import::Foreign;
+//! use abbe::files::import::Foreign;
 //!
 //! let file = Foreign { name: "poses.csv".into(), bytes: std::fs::read("poses.csv")? };
 //! let imported = import(&[file], Target::Machine("robot.toml".as_ref()), &ImportOptions::default())?;
@@ -15,17 +15,17 @@
 
 use std::path::Path;
 
+use abbe_files::ReadOptions;
+use abbe_files::import::session::{Draft, SESSION_FILE};
+use abbe_files::import::{ColumnFound, Foreign, Hint, Reading, Source, Understood, instrument};
+use abbe_files::read::machine_with_bodies;
+use abbe_files::store::Store;
 use abbe_identify::plausibility::{self, ConflictKind, Plausibility};
 use abbe_identify::start::with_targets;
 use abbe_identify::{IdentifyError, fit};
 use abbe_model::ModelError;
 use abbe_model::document::node::Node;
 use abbe_model::error::Location;
-use abbe_model::files::ReadOptions;
-use abbe_model::files::import::session::{Draft, SESSION_FILE};
-use abbe_model::files::import::{ColumnFound, Foreign, Hint, Reading, Source, Understood, instrument};
-use abbe_model::files::read::machine_with_bodies;
-use abbe_model::files::store::Store;
 use abbe_model::instrument::{Fault, InstrumentKind};
 use abbe_model::session::Session;
 use schemars::JsonSchema;

@@ -1,11 +1,12 @@
 //! Abbe: a modelling workspace for the geometric errors of machine tools and other serial chains.
 //!
-//! The facade of five crates. The command `abbe` is built on the same.
+//! The facade of six crates. The command `abbe` is built on the same.
 //!
 //! | for | look in |
 //! |---|---|
 //! | a program that fits, traces, simulates or prints an equation | [`prelude`] |
-//! | the machine, instruments, effects, sessions and their files | [`model`] |
+//! | the machine, instruments, effects, sessions | [`model`] |
+//! | their files: machines, sessions, tables of readings, robots | [`files`] |
 //! | estimates, uncertainty, the trace of unmodelled effects | [`identify`] |
 //! | what a set of readings would say: identifiability, next test, poses | [`plan`] |
 //! | what follows from an identified model: correction, export, comparison, history | [`apply`] |
@@ -51,6 +52,7 @@ extern crate self as abbe;
 
 pub use abbe_apply as apply;
 pub use abbe_codegen as codegen;
+pub use abbe_files as files;
 pub use abbe_identify as identify;
 pub use abbe_model as model;
 pub use abbe_plan as plan;
@@ -77,6 +79,8 @@ pub mod prelude {
 
     pub use abbe_codegen::print::Style;
     pub use abbe_codegen::{Equation, Options as EquationOptions, Order, SessionTest, check, language};
+    pub use abbe_files::read::add_node;
+    pub use abbe_files::table::memory::MemoryColumn;
     pub use abbe_identify::SessionFit;
     pub use abbe_identify::quantity::Given;
     pub use abbe_identify::results::{FitResult, ParameterResult, TraceResult};
@@ -85,8 +89,6 @@ pub mod prelude {
     pub use abbe_model::chain::Machine;
     pub use abbe_model::component::ErrorName;
     pub use abbe_model::error::ModelError;
-    pub use abbe_model::files::read::add_node;
-    pub use abbe_model::files::table::memory::MemoryColumn;
     pub use abbe_model::instrument::InstrumentKind;
     pub use abbe_model::session::Session;
     pub use abbe_plan::{PlanOptions, analyse};
@@ -96,6 +98,6 @@ pub mod prelude {
     /// # Errors
     /// [`ModelError`] with file, line and key of what cannot be used.
     pub fn read_session(file: impl AsRef<Path>) -> Result<Session, ModelError> {
-        abbe_model::files::session(file.as_ref(), &abbe_model::files::ReadOptions::default())
+        abbe_files::session(file.as_ref(), &abbe_files::ReadOptions::default())
     }
 }

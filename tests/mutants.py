@@ -132,7 +132,8 @@ def exclude_mutants_that_do_not_build(copy, originals, mutants, packages):
 
 # Folders whose tests cover a package, its own first.
 TESTED_BY = {
-    "abbe-model": ("model", "codegen", "identify", "plan", "apply", "."),
+    "abbe-model": ("model", "files", "codegen", "identify", "plan", "apply", "."),
+    "abbe-files": ("files", "identify", "plan", "apply", "."),
     "abbe-identify": ("identify", "plan", "apply", "."),
     "abbe-plan": ("plan", "."),
     "abbe-apply": ("apply", "."),

@@ -1,4 +1,4 @@
-//! Replays the fuzzer's corpus of errors as they are given in files. The corpus of `abbe-model` is replayed in that
+//! Replays the fuzzer's corpus of errors as they are given in files. The corpus of `abbe-files` is replayed in that
 //! crate.
 
 #[path = "../../fuzz/errors.rs"]

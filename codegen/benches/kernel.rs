@@ -8,8 +8,8 @@ use std::path::Path;
 
 use abbe_codegen::print::{Layout, Style};
 use abbe_codegen::{Equation, Options, ToolPoint, check, language};
+use abbe_files::machine;
 use abbe_model::component::ErrorName;
-use abbe_model::files::machine;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 #[allow(clippy::all, dead_code)]

@@ -21,10 +21,10 @@
 //! use abbe_codegen::print::Style;
 //! use abbe_codegen::{Equation, Options, Order, SessionTest, check, language};
 //! use abbe_model::component::ErrorName;
-//! use abbe_model::files::{self, ReadOptions};
+//! use abbe_files::ReadOptions;
 //!
 //! let plan = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/chapter5.toml");
-//! let session = files::session(&plan, &ReadOptions::default())?;
+//! let session = abbe_files::session(&plan, &ReadOptions::default())?;
 //! let test = session.tests.iter().find(|test| test.name == "C150").unwrap();
 //! let errors = [ErrorName::parse("EX0C").unwrap()];
 //! let options = Options { order: Order::First, ..Options::default() };

@@ -2,8 +2,8 @@
 
 use std::io;
 
+use abbe_files::spelling::suggestion;
 use abbe_model::chain::Machine;
-use abbe_model::files::spelling::suggestion;
 use abbe_model::instrument::InstrumentKind;
 use abbe_model::words::{cut, number};
 

@@ -29,10 +29,10 @@
 //!
 //! use abbe_identify::fit;
 //! use abbe_identify::trace::{TraceOptions, trace};
-//! use abbe_model::files::{self, ReadOptions};
+//! use abbe_files::ReadOptions;
 //!
 //! let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-//! let session = files::session(&file, &ReadOptions::default())?;
+//! let session = abbe_files::session(&file, &ReadOptions::default())?;
 //!
 //! let (problem, found) = fit::prepare(&session, 1)?;
 //! let declared = fit::report(&problem, &found)?;

@@ -2,11 +2,10 @@
 
 use std::path::Path;
 
+use abbe_files::read::lowered;
 use abbe_model::document::fault::Fault;
 use abbe_model::document::node::{Named, Node};
 use abbe_model::document::value::Long;
-use abbe_model::files;
-use abbe_model::files::read::lowered;
 use abbe_model::session::limits::{LARGEST, MAX_LENGTH_MM};
 use abbe_model::words::number as number_in_words;
 
@@ -154,7 +153,7 @@ pub fn read(path: &Path) -> Result<Vec<Given>, IdentifyError> {
             Err(Fault::new(format!("`{key}` is not text"), help).at(key))
         }
     };
-    let source = files::text(path, "the file of values")?;
+    let source = abbe_files::text(path, "the file of values")?;
     Ok(lowered(&source, |Long(values): &Long<Named<Node>>| values.0.iter().map(given).collect())?)
 }
 

@@ -113,10 +113,10 @@ const SETUP_STREAM: u128 = 0;
 /// use abbe_identify::fit;
 /// use abbe_identify::quantity::Given;
 /// use abbe_identify::simulate::{Simulation, simulate};
-/// use abbe_model::files::{self, ReadOptions};
+/// use abbe_files::ReadOptions;
 ///
 /// let plan = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/chapter5.toml");
-/// let mut session = files::session(&plan, &ReadOptions::default())?;
+/// let mut session = abbe_files::session(&plan, &ReadOptions::default())?;
 /// session.resolution_mm = None;
 /// let given = vec![Given::parse("EY0A=35.3um")?, Given::parse("EB0A=-1.29arcsec")?];
 /// let drawn = simulate(&session, &Simulation { given, noise_mm: Some(0.0), ..Simulation::default() })?;

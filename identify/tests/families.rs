@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use abbe_files::ReadOptions;
 use abbe_identify::SessionFit;
 use abbe_identify::fit::report;
 use abbe_identify::problem::Problem;
 use abbe_identify::trace::{TraceOptions, TraceOutcome, trace};
-use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::Session;
 use nalgebra::{Matrix3xX, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -72,7 +72,7 @@ fn session(name: &str, poses: usize, reach: [[f64; 2]; 3], more: &str) -> Sessio
                 target_mm = [900, 0, 400]\ntarget_u_um = 50\n";
     let file = folder.join("session.toml");
     std::fs::write(&file, format!("{SESSION}{test}{more}")).unwrap();
-    files::session(Path::new(&file), &ReadOptions::default()).unwrap()
+    abbe_files::session(Path::new(&file), &ReadOptions::default()).unwrap()
 }
 
 /// Rms of the readings of another session under the model that a trace found, µm. Only the pose of the tracker is

@@ -2,11 +2,11 @@
 
 use std::f64::consts::TAU;
 
+use abbe_files::read::add_node;
+use abbe_files::table::memory::MemoryColumn;
 use abbe_identify::fit;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
-use abbe_model::files::read::add_node;
-use abbe_model::files::table::memory::MemoryColumn;
 use abbe_model::session::Session;
 use serde_json::json;
 

@@ -8,8 +8,8 @@
 //! - [`instrument`]: readings from states of the axes;
 //! - [`sensitivity`]: readings and their derivatives by every component; [`replay`]: evaluation over columns of
 //!   readings;
-//! - [`session`]: machine, tests and readings, and their files; [`words`]: counts in messages; [`calendar`]:
-//!   dates and times of day in texts.
+//! - [`session`]: machine, tests and readings; [`document`]: the keys of their files;
+//! - [`words`]: counts in messages; [`calendar`]: dates and times of day in texts; [`quantity`]: units of files.
 //!
 //! The chain over plain and dual numbers: the reading of a ball bar, and its derivative by a location error of C,
 //! ∂L/∂EX0C = −R·sin C/L₀.
@@ -44,23 +44,6 @@
 //! assert!((with.eps + 100.0 * c.sin() / 125.0).abs() < 1e-12);
 //! # Ok::<(), abbe_model::ModelError>(())
 //! ```
-//!
-//! A session read from its file:
-//!
-//! ```
-//! use std::path::Path;
-//!
-//! use abbe_model::files::{self, ReadOptions};
-//!
-//! let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-//! let session = files::session(&file, &ReadOptions::default())?;
-//! assert_eq!(session.machine.code(), "w C A b Y X Z t");
-//! let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
-//! assert_eq!(names, ["A100", "A150", "C100", "C150"]);
-//! let readings = session.tests.iter().filter_map(|test| test.readings.as_ref());
-//! assert_eq!(readings.map(|readings| readings.rows()).sum::<usize>(), 2416);
-//! # Ok::<(), abbe_model::ModelError>(())
-//! ```
 
 #![cfg_attr(
     not(test),
@@ -78,11 +61,11 @@ pub mod driver;
 pub mod effect;
 pub mod error;
 pub mod expression;
-pub mod files;
 pub mod frames;
 pub mod instrument;
 pub mod pattern;
 pub mod pose;
+pub mod quantity;
 pub mod replay;
 pub mod rotation_error;
 pub mod scalar;

@@ -7,7 +7,7 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::Duration;
 
-use abbe_model::files::{ReadOptions, session as read};
+use abbe_files::{ReadOptions, session as read};
 use abbe_model::session::Session;
 use abbe_plan::design::Goal;
 use abbe_plan::improve::{ImproveOptions, improve};

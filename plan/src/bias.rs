@@ -12,6 +12,13 @@
 
 use std::collections::BTreeMap;
 
+use abbe_identify::IdentifyError;
+use abbe_identify::candidates::columns::Columns;
+use abbe_identify::candidates::library;
+use abbe_identify::linear::{Linearisation, is_of_interest};
+use abbe_identify::numerics::ranking::largest_first;
+use abbe_identify::problem::Problem;
+use abbe_identify::unit::Unit;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::effect::shape::Harmonic;
 use abbe_model::effect::{Component, Effect, Shape};
@@ -20,13 +27,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::PlanError;
-use abbe_identify::IdentifyError;
-use abbe_identify::candidates::columns::Columns;
-use abbe_identify::candidates::library;
-use abbe_identify::linear::{Linearisation, is_of_interest};
-use abbe_identify::numerics::ranking::largest_first;
-use abbe_identify::problem::Problem;
-use abbe_identify::unit::Unit;
 
 /// Highest order of the harmonics among the usual effects.
 const MAX_ORDER: f64 = 2.0;
@@ -171,14 +171,14 @@ pub fn bias_table(problem: &Problem, effects: &[Effect]) -> Result<BiasTable, Pl
 mod tests {
     use std::path::Path;
 
-    use abbe_model::files::{self, ReadOptions};
-
-    use super::*;
-    use crate::states;
+    use abbe_files::ReadOptions;
     use abbe_identify::fit;
     use abbe_identify::noise::{Noise, NoiseSource};
     use abbe_identify::quantity::Given;
     use abbe_identify::simulate::{Simulation, simulate};
+
+    use super::*;
+    use crate::states;
 
     /// A session is simulated with 1 µm (1″) of each usual effect of a plan and fitted without it. The estimates are
     /// the biases of the table, and the residual is what the table says remains, both within 1 %.
@@ -186,7 +186,7 @@ mod tests {
     fn biases_are_those_of_fits_of_simulated_sessions() {
         for (name, count) in [("hermle-c600u/chapter5.toml", 8), ("r-test/plan.toml", 3)] {
             let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions").join(name);
-            let mut session = files::session(&file, &ReadOptions::default()).unwrap();
+            let mut session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
             session.resolution_mm = None;
             let sigma = session.noise_mm.unwrap();
             let plan = states::complete(&session, true).unwrap();

@@ -307,7 +307,7 @@ impl Choice<'_> {
 mod tests {
     use std::path::Path;
 
-    use abbe_model::files::{self, ReadOptions};
+    use abbe_files::ReadOptions;
 
     use super::*;
 
@@ -316,7 +316,8 @@ mod tests {
     #[test]
     fn candidates_have_the_bars_of_the_session() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/chapter5.toml");
-        let mut session = files::session(&file, &ReadOptions { read_data: false, ..ReadOptions::default() }).unwrap();
+        let mut session =
+            abbe_files::session(&file, &ReadOptions { read_data: false, ..ReadOptions::default() }).unwrap();
         let bars = [(99.9881, 1e-4), (149.9946, 2e-4), (100.4, 7e-4)];
         for (test, (bar, u)) in session.tests.iter_mut().zip(bars.into_iter().chain([(310.0, 9e-4)])) {
             let Some(station) = test.station.bar_mut() else { panic!("a ball bar") };

@@ -2,17 +2,17 @@
 
 use std::sync::Arc;
 
+use abbe_identify::heldout::Folds;
+use abbe_identify::noise::{Noise, NoiseSource};
+use abbe_identify::problem::Problem;
+use abbe_identify::start;
+use abbe_identify::unit::ReadingUnit;
 use abbe_model::instrument::Station;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test, motion, planned};
 
 use crate::PlanError;
-use abbe_identify::heldout::Folds;
-use abbe_identify::noise::{Noise, NoiseSource};
-use abbe_identify::problem::Problem;
-use abbe_identify::start;
-use abbe_identify::unit::ReadingUnit;
 
 /// Assumed pause between two tests, s.
 const BETWEEN_TESTS_S: f64 = 120.0;
@@ -107,8 +107,7 @@ pub(crate) fn noise_of(session: &Session) -> Result<Noise, PlanError> {
 mod tests {
     use std::path::Path;
 
-    use abbe_model::files::{self, ReadOptions};
-
+    use abbe_files::ReadOptions;
     use abbe_identify::noise::{Noise, NoiseSource};
     use abbe_identify::series::paths::set_ups;
 
@@ -119,7 +118,7 @@ mod tests {
     #[test]
     fn the_pivot_turns_about_the_spindle_ball() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/chapter5.toml");
-        let session = files::session(&file, &ReadOptions::default()).unwrap();
+        let session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
         let plan = complete(&session, true).unwrap();
         let problem = problem_by_test(&plan, Noise::white(3e-4, NoiseSource::Stated)).unwrap();
         let found = set_ups(&problem);

@@ -18,6 +18,11 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use abbe_identify::linear::{Linearisation, is_of_interest};
+use abbe_identify::numerics::rank::Rank;
+use abbe_identify::numerics::solve::Svd;
+use abbe_identify::numerics::triangle::Triangle;
+use abbe_identify::problem::Problem;
 use abbe_model::instrument::SharedBy;
 use abbe_model::session::{Session, Test};
 use faer::Mat;
@@ -28,11 +33,6 @@ use serde::Serialize;
 
 use super::states;
 use crate::PlanError;
-use abbe_identify::linear::{Linearisation, is_of_interest};
-use abbe_identify::numerics::rank::Rank;
-use abbe_identify::numerics::solve::Svd;
-use abbe_identify::numerics::triangle::Triangle;
-use abbe_identify::problem::Problem;
 
 /// Number of random geometries.
 const GEOMETRIES: u64 = 3;
@@ -174,15 +174,15 @@ fn base(problem: &Problem, linear: &Linearisation) -> Vec<BaseParameter> {
 mod tests {
     use std::path::Path;
 
+    use abbe_files::ReadOptions;
+    use abbe_identify::noise::{Noise, NoiseSource};
     use abbe_model::component::ErrorName;
-    use abbe_model::files::{self, ReadOptions};
 
     use super::*;
-    use abbe_identify::noise::{Noise, NoiseSource};
 
     fn problem_of(name: &str, change: impl Fn(&mut Session)) -> Problem {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions").join(name);
-        let mut session = files::session(&file, &ReadOptions::default()).unwrap();
+        let mut session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
         change(&mut session);
         let plan = states::complete(&session, true).unwrap();
         states::problem_by_test(&plan, Noise::white(3e-4, NoiseSource::Stated)).unwrap()

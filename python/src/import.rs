@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
+use abbe::files::import::{Foreign, Hint};
+use abbe::files::store::Store;
 use abbe::import::{ImportOptions, Target, import};
 use abbe::model::document::node::Node;
-use abbe::model::files::import::{Foreign, Hint};
-use abbe::model::files::store::Store;
 use abbe::model::instrument;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

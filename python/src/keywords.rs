@@ -4,9 +4,9 @@
 //! number for the position of an axis is where the test holds the axis. Everything else is a key of `[[test]]`. `None`
 //! states nothing.
 
+use abbe::files::table::memory::{MemoryColumn, Values};
 use abbe::model::document::node::{Entry, Node, Value};
 use abbe::model::document::schema;
-use abbe::model::files::table::memory::{MemoryColumn, Values};
 use abbe::model::session::Session;
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;

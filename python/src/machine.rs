@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use abbe::files;
 use abbe::model;
 use abbe::model::document::{of_domain, print};
-use abbe::model::files;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 

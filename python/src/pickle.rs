@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use abbe::document::Origin;
+use abbe::files::read::plan_of;
+use abbe::files::{Source, SourceMap};
 use abbe::model::document::edit::SessionText;
-use abbe::model::files::read::plan_of;
-use abbe::model::files::{Source, SourceMap};
 use abbe::model::session::Test;
 use abbe::model::session::readings::{Origin as Lines, Readings};
 use numpy::{Element, IntoPyArray, PyArray1, PyArrayMethods};

@@ -5,6 +5,9 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use abbe::document::Origin;
+use abbe::files::read::{add_node, plan_of_node};
+use abbe::files::table::memory::MemoryColumn;
+use abbe::files::{self, Changes, ReadOptions, SourceMap};
 use abbe::identify::noise::{Noise, NoiseSource};
 use abbe::identify::problem::{Problem, RowBlock};
 use abbe::identify::quantity::Given;
@@ -14,11 +17,8 @@ use abbe::model::component::ErrorName;
 use abbe::model::document::edit::SessionText;
 use abbe::model::document::node::Node;
 use abbe::model::document::{of_domain, print};
-use abbe::model::driver::name_in_files;
+use abbe::model::driver::column;
 use abbe::model::effect::Component;
-use abbe::model::files::read::{add_node, plan_of_node};
-use abbe::model::files::table::memory::MemoryColumn;
-use abbe::model::files::{self, Changes, ReadOptions, SourceMap};
 use abbe::model::instrument::channel::labels;
 use abbe::model::sensitivity::TestModel;
 use abbe::model::session::{self as domain, Prior};
@@ -197,7 +197,7 @@ impl Session {
             columns.set_item("time_s", PyArray1::from_slice(py, &readings.time_s))?;
         }
         for (name, values) in &readings.drivers {
-            columns.set_item(name_in_files(name), PyArray1::from_slice(py, values))?;
+            columns.set_item(column::in_files(name), PyArray1::from_slice(py, values))?;
         }
         for (axis, positions) in state.session.machine.axes.iter().zip(&readings.positions) {
             let display = positions.iter().map(|position| axis.kind.to_display(*position));

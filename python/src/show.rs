@@ -1,6 +1,6 @@
 //! Tables and figures of a result as the command prints them, and its report.
 
-use abbe::model::files::SourceMap;
+use abbe::files::SourceMap;
 use abbe::model::session::Session;
 use abbe::printers::{csv, html, notebook, page, terminal};
 use abbe::report::block::Report;

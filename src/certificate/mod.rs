@@ -5,6 +5,8 @@
 
 mod write;
 
+use abbe_files::Source;
+use abbe_files::read::lowered;
 use abbe_identify::IdentifyError;
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
@@ -12,8 +14,6 @@ use abbe_identify::results::FitResult;
 use abbe_model::ModelError;
 use abbe_model::calendar;
 use abbe_model::document::fault::Fault;
-use abbe_model::files::Source;
-use abbe_model::files::read::lowered;
 use abbe_model::session::Session;
 use schemars::JsonSchema;
 use serde::Deserialize;

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use abbe::certificate::{self, Certificate, EXAMPLE, Stated};
+use abbe::files;
+use abbe::files::stamp::FileStamp;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::FitResult;
-use abbe::model::files;
-use abbe::model::files::stamp::FileStamp;
 use abbe::model::session::Session;
 use clap::Args;
 

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use abbe::apply::compare::{CompareOptions, Input, SIGNIFICANCE, compare_inputs};
 use abbe::document::StatedComparison;
+use abbe::files::stamp::FileStamp;
+use abbe::files::{self, ReadOptions, SourceMap};
 use abbe::identify::model_file;
-use abbe::model::files::stamp::FileStamp;
-use abbe::model::files::{self, ReadOptions, SourceMap};
 use clap::Args;
 
 use super::failure::Failure;

@@ -7,9 +7,9 @@ use std::path::PathBuf;
 
 use abbe::apply::correction::Correction;
 use abbe::apply::correction::stream::{self, Output, Summary};
+use abbe::files::{self, commands::CommandFile};
 use abbe::identify::model_file;
 use abbe::identify::model_file::errors::EstimatedErrors;
-use abbe::model::files::{self, commands::CommandFile};
 use abbe::model::pose::Aim;
 use clap::Args;
 

@@ -7,7 +7,7 @@ mod style;
 use abbe::codegen::print::{Audience, TestEquations};
 use abbe::codegen::{Checked, Equation, SessionTest, check};
 use abbe::equation;
-use abbe::model::files::{SourceMap, text};
+use abbe::files::{SourceMap, text};
 use abbe::model::session::{Session, Test};
 use clap::Args;
 

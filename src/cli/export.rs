@@ -6,9 +6,9 @@ use std::path::PathBuf;
 
 use abbe::apply::export::kinematics::ENTRIES;
 use abbe::exports::{self, Contents};
+use abbe::files;
+use abbe::files::robot::dh::Convention;
 use abbe::identify::model_file;
-use abbe::model::files;
-use abbe::model::files::robot::dh::Convention;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 

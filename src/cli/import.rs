@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
+use abbe::files::import::{Foreign, Hint, session};
+use abbe::files::store::Store;
 use abbe::identify::IdentifyError;
 use abbe::import::{ImportOptions, Target, import, is_of_new_session};
-use abbe::model::files::import::{Foreign, Hint, session};
-use abbe::model::files::store::Store;
 use abbe::model::instrument;
 use clap::Args;
 use clap::builder::PossibleValuesParser;

@@ -5,8 +5,8 @@ mod grid;
 use std::path::PathBuf;
 
 use abbe::apply::volumetric::{self, MachineWithErrors, functions};
+use abbe::files::{self, Source};
 use abbe::model::chain::Machine;
-use abbe::model::files::{self, Source};
 use clap::Args;
 
 use super::failure::Failure;

@@ -48,8 +48,8 @@ mod volumetric;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use abbe::files::{self, ReadOptions, SourceMap};
 use abbe::identify::plausibility::{self, ConflictKind, Plausibility};
-use abbe::model::files::{self, ReadOptions, SourceMap};
 use abbe::model::session::Session;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 

@@ -5,7 +5,7 @@ pub mod motion;
 use std::path::PathBuf;
 
 use abbe::codegen::nc::{self, NcFiles};
-use abbe::model::files::{self, ReadOptions};
+use abbe::files::{self, ReadOptions};
 use abbe::plan::collision;
 use clap::Args;
 

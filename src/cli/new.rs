@@ -7,8 +7,8 @@ mod templates;
 
 use std::path::PathBuf;
 
+use abbe::files::template;
 use abbe::model::ModelError;
-use abbe::model::files::template;
 use clap::Args;
 
 use self::sizes::SizeArguments;

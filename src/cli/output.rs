@@ -4,7 +4,7 @@ use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use abbe::model::files::SourceMap;
+use abbe::files::SourceMap;
 use abbe::temporary::{self, TemporaryFile};
 
 use super::failure::Failure;

@@ -5,7 +5,7 @@ mod readme;
 
 use std::path::PathBuf;
 
-use abbe::model::files;
+use abbe::files;
 use abbe::model::words::counted;
 use clap::Args;
 

@@ -4,7 +4,7 @@ mod options;
 
 use std::path::PathBuf;
 
-use abbe::model::files::{self, ReadOptions};
+use abbe::files::{self, ReadOptions};
 use abbe::plan::design::Goal;
 use abbe::plan::poses::without_place;
 use clap::Args;

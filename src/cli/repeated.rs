@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use abbe::files;
 use abbe::identify::{fit, model_file, repeated};
-use abbe::model::files;
 
 use super::failure::Failure;
 use super::output::{self, Outputs};

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use abbe::model::files::SourceMap;
-use abbe::model::files::stamp::FileStamp;
+use abbe::files::SourceMap;
+use abbe::files::stamp::FileStamp;
 use abbe::model::session::Session;
 use clap::Args;
 use serde::Serialize;

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
+use abbe::files::SourceMap;
 use abbe::identify::fit::Fit;
 use abbe::identify::model_file::IdentifiedModel;
 use abbe::identify::problem::Problem;
-use abbe::model::files::SourceMap;
 use clap::Args;
 
 use super::failure::Failure;

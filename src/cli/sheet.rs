@@ -5,7 +5,7 @@ mod order;
 use std::path::PathBuf;
 
 use abbe::codegen::nc::Control;
-use abbe::model::files::{self, ReadOptions};
+use abbe::files::{self, ReadOptions};
 use abbe::model::session::motion::Motion;
 use abbe::model::words::counted;
 use abbe::plan::sheet::{SetUpTimes, sheets};

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
+use abbe::files::{self, Changes, with_readings};
 use abbe::identify::quantity::{self, Given};
 use abbe::identify::simulate::{Simulation, SimulationResult, simulate};
 use abbe::identify::unit::ARCSEC;
-use abbe::model::files::{self, Changes, with_readings};
 use clap::Args;
 
 use super::failure::Failure;

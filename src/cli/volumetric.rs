@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use abbe::codegen::{Equation, ToolPoint};
 use abbe::equation::EquationParameters;
-use abbe::model::files;
+use abbe::files;
 use abbe::model::pattern;
 use clap::Args;
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use abbe_apply::history::events::{Compensation, KnownChange};
 
-use abbe_model::files::{self, Source};
+use abbe_files::Source;
 
 use super::FleetError;
 use super::date;
@@ -18,7 +18,7 @@ const COLUMNS: [&str; 5] = ["machine_id", "date", "parameter", "change", "unit"]
 /// # Errors
 /// If the file cannot be read; with the line of what cannot be used.
 pub fn read(file: &Path) -> Result<Vec<Compensation>, FleetError> {
-    of_source(&files::text(file, "the file of compensations")?)
+    of_source(&abbe_files::text(file, "the file of compensations")?)
 }
 
 /// As [`read`], from a file that has been read.

@@ -7,14 +7,14 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
+use abbe_files::stamp::FileStamp;
+use abbe_files::{ReadOptions, Source, SourceMap};
 use abbe_identify::IdentifyError;
 use abbe_identify::results::{FitResult, TraceResult};
 use abbe_identify::trace::{Progress, TraceOptions, trace};
 use abbe_identify::validate::validate;
 use abbe_identify::{SessionFit, model_file};
 use abbe_model::document::{of_domain, print};
-use abbe_model::files::stamp::FileStamp;
-use abbe_model::files::{self, ReadOptions, Source, SourceMap};
 use abbe_model::session::Session;
 use sha2::{Digest, Sha256};
 
@@ -115,9 +115,10 @@ fn inputs(file: &Path, options: &Options, places: &Places) -> Inputs {
         ..Record::default()
     };
     let mut model = None;
-    let text = files::text(file, "the session file");
+    let text = abbe_files::text(file, "the session file");
     let sha256 = text.as_ref().ok().and_then(|source| source.stamp.as_ref()?.sha256());
-    let read = text.and_then(|source| files::session_of(&source, &read_options)).map_err(|error| error.to_string());
+    let read =
+        text.and_then(|source| abbe_files::session_of(&source, &read_options)).map_err(|error| error.to_string());
     if let Ok((session, sources)) = &read {
         describe(&mut record, session);
         record.inputs = input_records(sources);
@@ -183,7 +184,7 @@ fn model_of(machine_id: &str, places: &Places) -> Option<Model> {
     if matches!(file.try_exists(), Ok(false)) {
         return None;
     }
-    let source = files::text(&file, "the model file").map_err(|error| error.to_string());
+    let source = abbe_files::text(&file, "the model file").map_err(|error| error.to_string());
     let sha256 = source.as_ref().ok().and_then(|source| source.stamp.as_ref()?.sha256());
     Some(Model { source, sha256 })
 }

@@ -8,7 +8,7 @@ use abbe::apply::export::kinematics::{EntryChoice, KinematicTable};
 use abbe::apply::export::neutral::AxisPlace;
 
 use abbe::exports::ExportResult;
-use abbe::model::files::robot::dh::Convention;
+use abbe::files::robot::dh::Convention;
 
 use super::block::Report;
 use super::table::{Cell, Column, Table, cells, numbers};

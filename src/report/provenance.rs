@@ -1,7 +1,7 @@
 //! Provenance of a report: input files with checksums, version, command line and seed.
 
-use abbe::model::files::SourceMap;
-use abbe::model::files::stamp::FileStamp;
+use abbe::files::SourceMap;
+use abbe::files::stamp::FileStamp;
 use abbe::model::session::Session;
 
 /// An input file.

@@ -3,11 +3,11 @@
 use abbe::identify::validate::ValidationVerdict;
 use std::path::Path;
 
+use abbe::files::Source;
+use abbe::files::{ReadOptions, session};
 use abbe::identify::model_file::{IdentifiedModel, Provenance, of_source};
 use abbe::identify::trace::{TraceOptions, trace};
 use abbe::identify::validate::{ValidationResult, validate};
-use abbe::model::files::Source;
-use abbe::model::files::{ReadOptions, session};
 use abbe::model::session::Session;
 use rand::RngExt;
 use rayon::prelude::*;

@@ -1,9 +1,9 @@
 //! A displacement that follows the temperature of the spindle with a first-order lag, and one that follows a
 //! temperature collinear with time.
 
+use abbe::files::{ReadOptions, session};
 use abbe::identify::results::{EffectName, EffectResult};
 use abbe::identify::trace::{TraceOptions, trace};
-use abbe::model::files::{ReadOptions, session};
 use nalgebra::Vector3;
 use rand::RngExt;
 

@@ -8,7 +8,7 @@
 
 use std::path::{Path, PathBuf};
 
-use abbe::model::files::{ReadOptions, session};
+use abbe::files::{ReadOptions, session};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;

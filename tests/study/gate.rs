@@ -1,12 +1,12 @@
 //! An effect that the search cannot find: no verdict calls the model complete, no limit is decided, no estimate may be
 //! quoted.
 
+use abbe::files::{ReadOptions, session};
 use abbe::identify::SessionFit;
 use abbe::identify::results::TraceVerdict;
 use abbe::identify::tolerance::rule::Decision;
 use abbe::identify::trace::screening::screened_effects;
 use abbe::identify::trace::{TraceOptions, trace};
-use abbe::model::files::{ReadOptions, session};
 use abbe::model::session::tolerance::{Limit, Tolerance, Toleranced};
 use rayon::prelude::*;
 

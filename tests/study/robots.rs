@@ -3,11 +3,11 @@
 
 use std::path::Path;
 
+use abbe::files::{ReadOptions, session};
 use abbe::identify::model_file::{IdentifiedModel, Provenance};
 use abbe::identify::results::TraceVerdict;
 use abbe::identify::trace::{TraceOptions, TraceOutcome, trace};
 use abbe::identify::validate::validate;
-use abbe::model::files::{ReadOptions, session};
 use abbe::model::session::Session;
 use rayon::prelude::*;
 

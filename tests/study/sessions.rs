@@ -4,9 +4,9 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Instant;
 
+use abbe::files::{ReadOptions, session};
 use abbe::identify::results::TraceResult;
 use abbe::identify::trace::{TraceOptions, trace};
-use abbe::model::files::{ReadOptions, session};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;

@@ -2,10 +2,10 @@
 
 use abbe::apply::ApplyError;
 use abbe::codegen::CodegenError;
+use abbe::files::store::Store;
 use abbe::identify::IdentifyError;
 use abbe::model::ModelError;
 use abbe::model::error::Location;
-use abbe::model::files::store::Store;
 use abbe::model::words::shortened;
 use abbe::plan::PlanError;
 use serde::Serialize;

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use abbe::document::Origin;
-use abbe::model::files::store::Store;
-use abbe::model::files::{self, ReadOptions, SourceMap};
+use abbe::files::store::Store;
+use abbe::files::{self, ReadOptions, SourceMap};
 use abbe::model::session::Session;
 use abbe::model::session::motion::Motion;
 use serde_json::json;

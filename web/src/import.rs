@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use abbe::files::import::session::keys;
+use abbe::files::import::{Foreign, Hint};
+use abbe::files::store::Store;
 use abbe::import::{ImportOptions, ImportResult, Imported, Target, import};
 use abbe::model::axis::AxisKind;
-use abbe::model::files::import::session::keys;
-use abbe::model::files::import::{Foreign, Hint};
-use abbe::model::files::store::Store;
 use abbe::model::instrument::{Fault, kinds};
 use abbe::model::session::Session;
 use serde::{Deserialize, Serialize};

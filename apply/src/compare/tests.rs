@@ -2,21 +2,21 @@
 
 use std::path::Path;
 
-use abbe_model::files::{self, ReadOptions};
+use abbe_files::ReadOptions;
+use abbe_identify::fit;
+use abbe_identify::model_file::{ModelParameter, Provenance};
+use abbe_identify::quantity::Given;
+use abbe_identify::simulate::{Simulation, simulate};
 use abbe_model::instrument::ballbar::BAR;
 use abbe_model::session::{Prior, Session};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
-use abbe_identify::fit;
-use abbe_identify::model_file::{ModelParameter, Provenance};
-use abbe_identify::quantity::Given;
-use abbe_identify::simulate::{Simulation, simulate};
 
 fn plan() -> Session {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/chapter5.toml");
-    files::session(&file, &ReadOptions { read_data: false, ..ReadOptions::default() }).unwrap()
+    abbe_files::session(&file, &ReadOptions { read_data: false, ..ReadOptions::default() }).unwrap()
 }
 
 /// A session with the same bars as its partner, and balls that were mounted for it.

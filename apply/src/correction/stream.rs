@@ -2,7 +2,11 @@
 
 use std::io::Write;
 
-use abbe_model::files::commands::{Block, CommandFile, PoseColumns};
+use abbe_files::commands::{Block, CommandFile, PoseColumns};
+use abbe_identify::IdentifyError;
+use abbe_identify::numerics::parallel;
+use abbe_identify::unit::ARCSEC;
+use abbe_model::pose::{Aim, Pose, reach};
 use abbe_model::session::readings::Readings;
 use csv::StringRecord;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -11,10 +15,6 @@ use serde::Serialize;
 
 use super::{Correction, State};
 use crate::ApplyError;
-use abbe_identify::IdentifyError;
-use abbe_identify::numerics::parallel;
-use abbe_identify::unit::ARCSEC;
-use abbe_model::pose::{Aim, Pose, reach};
 
 /// Rows of a block.
 const BLOCK_ROWS: usize = 2048;

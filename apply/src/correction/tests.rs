@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use abbe_files::commands::CommandFile;
 use abbe_identify::model_file::errors::{EstimatedEffect, EstimatedErrors};
 use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::chain::Machine;
@@ -9,7 +10,6 @@ use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::driver::{Driver, Reference};
 use abbe_model::effect::shape::{Harmonic, Polynomial, Shape};
 use abbe_model::effect::{Component, Effect};
-use abbe_model::files::commands::CommandFile;
 use abbe_model::instrument::Station;
 use abbe_model::pose::reach;
 use abbe_model::session::readings::Readings;
@@ -181,7 +181,7 @@ fn a_five_axis_machine_is_corrected_to_a_picometre() {
 
 fn ur10() -> Machine {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-    abbe_model::files::machine(&folder.join("../sessions/ur10/machine.toml")).unwrap()
+    abbe_files::machine(&folder.join("../sessions/ur10/machine.toml")).unwrap()
 }
 
 #[test]

@@ -12,11 +12,11 @@
 //! The nominal table is the maker's own, or one that follows from the nominal machine (`dh_nominal`). The frames of
 //! the calibrated table are those of its lines that lie nearest to the nominal ones (`dh_frames`).
 
+use abbe_files::robot::dh::{Convention, Table};
 use abbe_identify::IdentifyError;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName};
-use abbe_model::files::robot::dh::{Convention, Table};
 use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 use schemars::JsonSchema;
 use serde::Serialize;

@@ -4,7 +4,7 @@
 //! the two axes are nearly parallel, its origin is the point of the axis nearest to the nominal origin, and its X leads to the
 //! next axis in the plane across Z (Hayati).
 
-use abbe_model::files::robot::dh::{Convention, Table};
+use abbe_files::robot::dh::{Convention, Table};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 /// Sine of the angle between two axes below which they count as parallel.

@@ -1,7 +1,11 @@
 //! Exported descriptions, read by kinematics that know the format and not its writer.
 
+use abbe_files::robot::dh::Convention;
+use abbe_identify::model_file::{IdentifiedModel, ModelParameter, Provenance, Quality};
+use abbe_identify::noise::{Noise, NoiseSource};
+use abbe_identify::parameters::Role;
+use abbe_identify::unit::Unit;
 use abbe_model::chain::{AxisPosition, Machine};
-use abbe_model::files::robot::dh::Convention;
 use abbe_model::frames::Point;
 use abbe_model::session::Prior;
 use faer::Mat;
@@ -11,10 +15,6 @@ use rand::{Rng, RngExt, SeedableRng};
 use super::dh::{DhTable, DhTables, FixedPose};
 use super::frames::location_errors;
 use super::{dh, urdf};
-use abbe_identify::model_file::{IdentifiedModel, ModelParameter, Provenance, Quality};
-use abbe_identify::noise::{Noise, NoiseSource};
-use abbe_identify::parameters::Role;
-use abbe_identify::unit::Unit;
 
 pub(super) fn model(machine: Machine, errors: &[(String, f64)]) -> IdentifiedModel {
     let parameters: Vec<ModelParameter> = errors
@@ -53,7 +53,7 @@ pub(super) fn model(machine: Machine, errors: &[(String, f64)]) -> IdentifiedMod
 
 pub(super) fn robot() -> Machine {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-    abbe_model::files::machine(&folder.join("../sessions/ur10/machine.toml")).unwrap()
+    abbe_files::machine(&folder.join("../sessions/ur10/machine.toml")).unwrap()
 }
 
 pub(super) fn random_errors(machine: &Machine, random: &mut impl Rng) -> Vec<(String, f64)> {

@@ -4,12 +4,12 @@
 //! `M_k = Π Trans(o_j)·E0_j·Trans(−o_j)` displaces the body that the joint moves. With the fixed joints `F` between them, the
 //! new origin is `F⁻¹·C_{k−1}⁻¹·C_k`. A prismatic joint is turned onto its tilted direction; the next joint turns back.
 
+use abbe_files::Source;
+use abbe_files::robot::chain::Chain;
+use abbe_files::robot::urdf::{self, UrdfJoint};
 use abbe_identify::IdentifyError;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_model::axis::AxisKind;
-use abbe_model::files::Source;
-use abbe_model::files::robot::chain::Chain;
-use abbe_model::files::robot::urdf::{self, UrdfJoint};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::frames::{JointFrame, location_errors, roll_pitch_yaw, tool_side};

@@ -1,22 +1,22 @@
 //! Errors of a machine as functions of its axes: constants, tables, polynomials, harmonics.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
+use abbe_files::Source;
+use abbe_files::read::lowered;
+use abbe_identify::quantity::Given;
+use abbe_identify::unit::{ARCSEC, Unit};
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{ERRORS_PER_AXIS, Machine};
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::document::fault::{Fault, Within};
 use abbe_model::document::value::{Long, Positive};
-use abbe_model::files::read::lowered;
-use abbe_model::files::{self, Source};
 use abbe_model::instrument::InternalUnit;
 use schemars::JsonSchema;
 use serde::Deserialize;
-use std::collections::BTreeMap;
 
 use crate::ApplyError;
-use abbe_identify::quantity::Given;
-use abbe_identify::unit::{ARCSEC, Unit};
 
 /// The form of an error function; values in mm or rad.
 #[derive(Clone, Debug, PartialEq)]
@@ -190,7 +190,7 @@ struct Harmonic {
 /// If the file cannot be read, is not of this form, holds a number beyond the limits of input, or names something that
 /// the machine lacks. The message names the file and the line.
 pub fn read(path: &Path, machine: &Machine) -> Result<Vec<ErrorFunction>, ApplyError> {
-    of_source(&files::text(path, "the file of error functions")?, machine)
+    of_source(&abbe_files::text(path, "the file of error functions")?, machine)
 }
 
 /// As [`read`], from a file that has been read.

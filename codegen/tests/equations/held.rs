@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use abbe_codegen::print::Style;
 use abbe_codegen::{Arrangement, Equation, Options, Order, SessionTest, check, language};
-use abbe_model::files::{self, ReadOptions};
+use abbe_files::ReadOptions;
 use abbe_model::frames::Rotation;
 use abbe_model::session::Session;
 
@@ -37,7 +37,7 @@ fn of_table(angle: &str, [sin, cos]: [&str; 2], bar: &str, along: &str) -> Sessi
     let folder = tools::folder(&format!("held-{}", COUNT.fetch_add(1, Ordering::Relaxed)));
     std::fs::copy(sessions().join("hermle-c600u/machine.toml"), folder.join("machine.toml")).expect("a machine");
     tools::write(&folder.join("session.toml"), &text);
-    let session = files::session(&folder.join("session.toml"), &ReadOptions::default()).expect("a session");
+    let session = abbe_files::session(&folder.join("session.toml"), &ReadOptions::default()).expect("a session");
     let _ = std::fs::remove_dir_all(&folder);
     session
 }
@@ -136,8 +136,8 @@ fn numbers_of_a_held_axis_are_exact() {
 /// Eqs. 3.20 and 3.21 of Jiang (2014) from the bundled session: the tests of A hold C, which stays a symbol.
 #[test]
 fn the_equations_of_the_thesis_from_the_bundled_session() {
-    let session =
-        files::session(&sessions().join("hermle-c600u/chapter5.toml"), &ReadOptions::default()).expect("a session");
+    let session = abbe_files::session(&sessions().join("hermle-c600u/chapter5.toml"), &ReadOptions::default())
+        .expect("a session");
     let symbols = ["A", "C"].map(String::from);
     let options =
         Options { arrangement: Arrangement::Single, rotation: Some(Rotation::SmallAngle), ..Options::default() };

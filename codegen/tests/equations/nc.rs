@@ -6,17 +6,17 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use abbe_codegen::nc::{self, NcOptions};
+use abbe_files::ReadOptions;
 use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::chain::Machine;
-use abbe_model::files::{self, ReadOptions};
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::session::placing::balls;
 use abbe_model::session::planned::planned;
 use abbe_model::session::{Session, Test};
+use decode::{Counting, Move, Positions, canonical, of_g_codes, of_plain_text, of_three_decimals};
 use nalgebra::DVector;
 
 use crate::tools::folder;
-use decode::{Counting, Move, Positions, canonical, of_g_codes, of_plain_text, of_three_decimals};
 
 fn bar_of(test: &Test) -> BallBar<f64> {
     BallBar {
@@ -95,7 +95,7 @@ fn apart(machine: &Machine, state: &[f64], from: &[f64], to: &[f64]) -> f64 {
 }
 
 fn session(path: &Path) -> Session {
-    files::session(path, &ReadOptions { read_data: false, ..ReadOptions::default() }).unwrap()
+    abbe_files::session(path, &ReadOptions { read_data: false, ..ReadOptions::default() }).unwrap()
 }
 
 /// Circles in three planes and synchronous paths of C (BK2) and A (BK1) beside the bundled plans.

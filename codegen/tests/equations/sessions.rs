@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use abbe_codegen::print::{LANGUAGES, Layout, Style, TestEquations};
 use abbe_codegen::{Equation, Kind, Options, Order, SessionTest, check};
-use abbe_model::files;
+use abbe_files::ReadOptions;
 
 use crate::support::printed;
 
@@ -14,7 +14,7 @@ fn file(name: &str) -> PathBuf {
 
 /// The page of all tests of a session.
 pub fn system(name: &str, order: Order, word: &str, style: &Style) -> String {
-    let session = files::session(&file(name), &files::ReadOptions::default()).expect("a session");
+    let session = abbe_files::session(&file(name), &ReadOptions::default()).expect("a session");
     let equations = |order: Order| -> Vec<(Equation, SessionTest<'_>)> {
         let options = Options { order, ..Options::default() };
         let of = |test| {
@@ -56,7 +56,7 @@ fn the_equations_of_a_session() {
 fn every_test_of_the_bundled_plans() {
     for chapter in ["chapter4", "chapter5", "chapter6"] {
         let path = file(&format!("hermle-c600u/{chapter}.toml"));
-        let session = files::session(&path, &files::ReadOptions::default()).expect("a session");
+        let session = abbe_files::session(&path, &ReadOptions::default()).expect("a session");
         for test in &session.tests {
             let source = SessionTest::new(&session, test).expect("a plan");
             for order in [Order::Exact, Order::Bilinear, Order::First] {
@@ -79,7 +79,7 @@ fn every_named_argument_is_used() {
     let style = Style { layout: Layout::Named, ..Style::default() };
     for chapter in ["chapter4", "chapter5", "chapter6"] {
         let path = file(&format!("hermle-c600u/{chapter}.toml"));
-        let session = files::session(&path, &files::ReadOptions::default()).expect("a session");
+        let session = abbe_files::session(&path, &ReadOptions::default()).expect("a session");
         for test in &session.tests {
             let source = SessionTest::new(&session, test).expect("a plan");
             let equation = Equation::of(&session.machine, &source, &session.unknowns, &Options::default());
@@ -102,7 +102,7 @@ fn every_named_argument_is_used() {
 #[test]
 fn every_test_of_the_self_calibration() {
     let path = file("self-calibration/session.toml");
-    let session = files::session(&path, &files::ReadOptions::default()).expect("a session");
+    let session = abbe_files::session(&path, &ReadOptions::default()).expect("a session");
     for test in &session.tests {
         let source = SessionTest::new(&session, test).expect("a plan");
         for order in [Order::Exact, Order::Bilinear, Order::First] {
@@ -122,7 +122,7 @@ fn every_test_of_the_self_calibration() {
 #[test]
 fn lengths_derived_from_the_bar_stay_expressions() {
     let path = file("hermle-c600u/chapter5.toml");
-    let session = files::session(&path, &files::ReadOptions::default()).expect("a session");
+    let session = abbe_files::session(&path, &ReadOptions::default()).expect("a session");
     let test = session.tests.iter().find(|test| test.name == "A150").expect("the test");
     let source = SessionTest::new(&session, test).expect("a plan");
     let equation = Equation::of(&session.machine, &source, &session.unknowns, &Options::default());

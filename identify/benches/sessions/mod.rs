@@ -1,11 +1,12 @@
 //! Generates sessions of any size: ball-bar tests of a five-axis machine, simulated with some errors.
 
-use abbe_identify::quantity::Given;
-use abbe_identify::simulate::{Simulation, simulate};
-use abbe_model::files::{ReadOptions, session as read};
-use abbe_model::session::Session;
 use std::fmt::Write;
 use std::path::Path;
+
+use abbe_files::{ReadOptions, session as read};
+use abbe_identify::quantity::Given;
+use abbe_identify::simulate::{Simulation, simulate};
+use abbe_model::session::Session;
 
 /// The session of chapter 5 with about 3,616 readings and no undeclared effect.
 pub fn chapter_5() -> Session {

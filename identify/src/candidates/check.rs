@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 use std::sync::Arc;
 
-use abbe_model::files::{self, ReadOptions};
+use abbe_files::ReadOptions;
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
 
@@ -19,7 +19,7 @@ use crate::problem::Problem;
 /// The bundled session with some readings rejected and noise of a given autocorrelation.
 fn problem(ar_coefficients: &[f64]) -> (Problem, Vec<f64>) {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-    let (mut problem, fit) = prepare(&files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
+    let (mut problem, fit) = prepare(&abbe_files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
     problem.noise.ar_coefficients = ar_coefficients.to_vec();
     for (test, row) in [(0, 3), (0, 40), (1, 41), (2, 0), (3, 77)] {
         problem.rejected[test][row] = true;
@@ -172,7 +172,7 @@ fn gains_of_a_long_session_are_those_of_least_squares() {
         workpiece_ball_mm = [0, 0, 0]\nspindle_ball_mm = [0, 0, 0]\nworkpiece_ball_u_um = [2, 2, 0]\n";
     let file = folder.path().join("session.toml");
     std::fs::write(&file, text).unwrap();
-    let (problem, fit) = prepare(&files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
+    let (problem, fit) = prepare(&abbe_files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
     let columns = Columns::new(&problem, &fit.beta);
     let (model, residual) = model(&columns, &fit.beta);
     let all = library::candidates(&problem).unwrap();

@@ -205,7 +205,7 @@ fn restore_predictions(problem: &Problem, fit: &Fit, held: &[usize], beta: &mut 
 mod tests {
     use std::path::Path;
 
-    use abbe_model::files::{self, ReadOptions};
+    use abbe_files::ReadOptions;
 
     use super::*;
     use crate::fit::prepare;
@@ -215,7 +215,7 @@ mod tests {
     #[test]
     fn predictions_do_not_depend_on_the_gauge() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let mut session = files::session(&file, &ReadOptions::default()).unwrap();
+        let mut session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
         let names =
             ["X", "Y", "Z", "A", "B", "C"].into_iter().flat_map(|freedom| ["A", "C"].map(|axis| (freedom, axis)));
         session.unknowns = names.filter_map(|(f, axis)| ErrorName::parse(&format!("E{f}0{axis}"))).collect();

@@ -223,10 +223,10 @@ mod tests {
     use std::path::Path;
     use std::sync::Arc;
 
+    use abbe_files::ReadOptions;
     use abbe_model::driver::Driver;
     use abbe_model::effect::shape::Local;
     use abbe_model::effect::{Component, Effect, Shape};
-    use abbe_model::files::{self, ReadOptions};
     use nalgebra::DMatrix;
 
     use super::*;
@@ -245,7 +245,7 @@ mod tests {
     /// The problem of a measured session with readings that its model predicts exactly, with a bump at other numbers.
     fn problem() -> Problem {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let session = files::session(&file, &ReadOptions::default()).unwrap();
+        let session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
         let (mut problem, _) = prepare(&session, 1).unwrap();
         let mut true_problem = problem.clone();
         true_problem.add_effect(&bump(TRUE_NUMBERS)).unwrap();

@@ -83,10 +83,10 @@ pub(crate) fn values_at(
 mod tests {
     use std::path::Path;
 
+    use abbe_files::ReadOptions;
     use abbe_model::driver::Driver;
     use abbe_model::effect::shape::Harmonic;
     use abbe_model::effect::{Component, Effect, Shape};
-    use abbe_model::files::{self, ReadOptions};
 
     use super::*;
     use crate::fit::{fit, prepare};
@@ -95,7 +95,7 @@ mod tests {
     #[test]
     fn amplitude_and_phase_of_a_harmonic_follow_from_its_coefficients() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let session = files::session(&file, &ReadOptions::default()).unwrap();
+        let session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
         let (mut problem, _) = prepare(&session, 1).unwrap();
         problem
             .add_effect(&Effect::new(

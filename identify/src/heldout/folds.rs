@@ -206,14 +206,14 @@ mod tests {
     use std::path::Path;
     use std::sync::Arc;
 
-    use abbe_model::files::{self, ReadOptions};
+    use abbe_files::ReadOptions;
 
     use super::*;
 
     /// The bundled session (four tests of four runs) with another run column.
     fn numbered(number: impl Fn(usize, i64) -> i64) -> Session {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let mut session = files::session(&file, &ReadOptions::default()).unwrap();
+        let mut session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
         for readings in session.tests.iter_mut().filter_map(|test| test.readings.as_mut()).map(Arc::make_mut) {
             for (row, run) in readings.run.iter_mut().enumerate() {
                 *run = number(row, *run);

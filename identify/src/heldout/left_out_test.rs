@@ -215,7 +215,7 @@ impl LeftOut<'_> {
 mod tests {
     use std::path::Path;
 
-    use abbe_model::files::{self, ReadOptions};
+    use abbe_files::ReadOptions;
 
     use super::*;
     use crate::fit::prepare;
@@ -267,7 +267,7 @@ mod tests {
     #[test]
     fn the_residuals_equal_those_of_two_dense_problems() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let session = files::session(&file, &ReadOptions::default()).unwrap();
+        let session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
         let (problem, fit) = prepare(&session, 1).unwrap();
         let found = left_out_tests(&problem, &fit.beta).unwrap();
         let (size, count) = (problem.parameters.sizes(), fit.beta.len());

@@ -1,20 +1,20 @@
 //! A model from its JSON text, with the checks that a file of a user needs.
 
-use abbe_model::instrument::kinds;
 use std::path::Path;
 
+use abbe_files::Source;
+use abbe_files::read::{effect_of_document, machine_of_document};
 use abbe_model::ModelError;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::document::fault::{Fault, Within};
 use abbe_model::document::kind::Kind;
-use abbe_model::document::source::Source;
 use abbe_model::document::value::{Long, Positive};
-use abbe_model::driver::{Driver, Reference, TEMPERATURE};
+use abbe_model::driver::column::TEMPERATURE;
+use abbe_model::driver::{Driver, Reference};
 use abbe_model::effect::Effect;
 use abbe_model::error::Location;
-use abbe_model::files;
-use abbe_model::files::read::{effect_of_document, machine_of_document};
+use abbe_model::instrument::kinds;
 use abbe_model::session::Prior;
 use abbe_model::session::parameters_of;
 use faer::Mat;
@@ -43,7 +43,7 @@ const SAVE_AGAIN: &str = "save the model again";
 /// If the file cannot be read, is no model, is of a newer version, or was changed by hand: the file, the line, the key,
 /// what was found and what to do.
 pub fn read(path: &Path) -> Result<IdentifiedModel, IdentifyError> {
-    Ok(of_source(&files::text(path, "the model file")?)?)
+    Ok(of_source(&abbe_files::text(path, "the model file")?)?)
 }
 
 /// Whether a text is meant as a saved model rather than a session. A model is JSON; no session begins with a brace.

@@ -1,13 +1,13 @@
 use std::path::Path;
 
+use abbe_files::ReadOptions;
+use abbe_files::read::effect_of_document;
 use abbe_model::ModelError;
 use abbe_model::document::effect;
 use abbe_model::document::node::Named;
 use abbe_model::driver::Driver;
 use abbe_model::effect::shape::Shape;
 use abbe_model::effect::{Component, Effect};
-use abbe_model::files::read::effect_of_document;
-use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::Session;
 use serde_json::Value;
 
@@ -20,10 +20,11 @@ use crate::problem::Problem;
 /// A bundled session with an effect on the axial motion of C, and its fit.
 fn fitted() -> (Session, Problem, Fit) {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-    let mut session = files::session(&file, &ReadOptions::default()).unwrap();
+    let mut session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
     let text = "[[effect]]\ncomponent = \"EZC\"\nshape = \"harmonic\"\norder = 2\n[[effect]]\ncomponent = \"EXA\"\n\
                 shape = \"periodic\"\nperiod_deg = 33.3\n";
-    let document: Named<Vec<effect::Effect>> = files::Source::new(&file, text).parse().unwrap().document().unwrap();
+    let document: Named<Vec<effect::Effect>> =
+        abbe_files::Source::new(&file, text).parse().unwrap().document().unwrap();
     let effects = document.0[0].1.iter();
     let read =
         effects.map(|of| effect_of_document(of, &session.machine, &session.instrument_parameters(), &[]).unwrap());
@@ -38,7 +39,7 @@ fn text() -> String {
 }
 
 fn read_text(text: &str) -> Result<IdentifiedModel, ModelError> {
-    of_source(&files::Source::new(Path::new("model.json"), text))
+    of_source(&abbe_files::Source::new(Path::new("model.json"), text))
 }
 
 #[test]

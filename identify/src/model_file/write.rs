@@ -3,7 +3,7 @@
 use abbe_model::document::kind::Kind;
 use abbe_model::document::of_domain;
 use abbe_model::document::value::{Long, Positive};
-use abbe_model::driver::TEMPERATURE;
+use abbe_model::driver::column::TEMPERATURE;
 use abbe_model::session::Prior;
 use serde_json::Value;
 use sha2::{Digest, Sha256};

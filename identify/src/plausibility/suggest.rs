@@ -108,7 +108,7 @@ mod tests {
     use std::path::Path;
     use std::sync::Arc;
 
-    use abbe_model::files::{self, ReadOptions};
+    use abbe_files::ReadOptions;
 
     use super::*;
 
@@ -116,7 +116,7 @@ mod tests {
     #[test]
     fn the_residual_alone_frees_no_parameter() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let mut session = files::session(&file, &ReadOptions::default()).unwrap();
+        let mut session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
         // One test is 2 mm too short throughout, as with another bar.
         let readings = session.tests[1].readings.as_mut().unwrap();
         Arc::make_mut(readings).observed.iter_mut().for_each(|observed| *observed -= 2.0);

@@ -229,7 +229,7 @@ impl LeastSquares for SimulatedFit<'_, '_> {
 mod tests {
     use std::path::Path;
 
-    use abbe_model::files::{self, ReadOptions};
+    use abbe_files::ReadOptions;
 
     use super::*;
     use crate::fit::prepare;
@@ -239,7 +239,7 @@ mod tests {
     #[test]
     fn sum_of_squares_and_gradient_of_a_simulated_session_agree() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let session = files::session(&file, &ReadOptions::default()).unwrap();
+        let session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
         let (problem, fit) = prepare(&session, 1).unwrap();
         let refit = Refit::new(&problem, &fit).unwrap();
         // Deviations of one standard uncertainty with alternating signs.

@@ -6,6 +6,13 @@
 
 use std::ops::Range;
 
+use abbe_model::axis::{Axis, AxisKind};
+use abbe_model::driver::Driver;
+use abbe_model::effect::shape::{Curve, Local, Periodic};
+use abbe_model::effect::{Component, Effect, Shape};
+use abbe_model::instrument::channel::{Channel, labels};
+use abbe_model::session::readings::Readings;
+
 use super::constants::STRUCTURED;
 use super::start::Start;
 use crate::candidates::columns::{Columns, EffectColumns};
@@ -15,12 +22,6 @@ use crate::error::IdentifyError;
 use crate::numerics::parallel;
 use crate::numerics::tails::ln_chi_square_tail;
 use crate::problem::Problem;
-use abbe_model::axis::{Axis, AxisKind};
-use abbe_model::driver::Driver;
-use abbe_model::effect::shape::{Curve, Local, Periodic};
-use abbe_model::effect::{Component, Effect, Shape};
-use abbe_model::instrument::channel::{Channel, labels};
-use abbe_model::session::readings::Readings;
 
 /// Structure in a residual.
 #[derive(Clone, Debug)]
@@ -297,14 +298,14 @@ fn structure_by_batches(
 mod tests {
     use std::path::Path;
 
-    use abbe_model::files::{self, ReadOptions};
+    use abbe_files::ReadOptions;
 
     use super::*;
     use crate::fit::{Fit, prepare};
 
     fn measured() -> (Problem, Fit) {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        prepare(&files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap()
+        prepare(&abbe_files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap()
     }
 
     #[test]

@@ -1,18 +1,18 @@
-use crate::noise::NoiseSource;
 use std::path::Path;
 
+use abbe_files::ReadOptions;
 use abbe_model::component::ErrorName;
-use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::{Prior, Session};
 
 use super::*;
 use crate::fit::prepare;
 use crate::model_file::Provenance;
+use crate::noise::NoiseSource;
 
 /// The tests of a bundled session with these names, and one error to be estimated.
 fn session(tests: &[&str]) -> Session {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-    let mut session = files::session(&file, &ReadOptions::default()).unwrap();
+    let mut session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
     session.tests.retain(|test| tests.contains(&test.name.as_str()));
     session.unknowns = vec![ErrorName::parse("EX0C").unwrap()];
     session.noise_mm = Some(1e-3);

@@ -16,10 +16,10 @@ mod poses;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use abbe_files::ReadOptions;
 use abbe_model::driver::Driver;
 use abbe_model::effect::shape::{FirstOrderLag, Warmup};
 use abbe_model::effect::{Effect, Shape};
-use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::Session;
 use abbe_model::session::planned::planned_session;
 use changes::{At, Changes, Share, changes};
@@ -51,7 +51,7 @@ fn session(toml: &str) -> Session {
     std::fs::write(&path, toml.replace("\"sessions/", &sessions)).unwrap();
     poses::write(folder.path(), &path);
     let options = ReadOptions { allow_outside: true, ..ReadOptions::default() };
-    let mut session = files::session(&path, &options).unwrap();
+    let mut session = abbe_files::session(&path, &options).unwrap();
     let planned = planned_session(&session).unwrap();
     for (test, mut readings) in session.tests.iter_mut().zip(planned) {
         let rises = readings.time_s.iter().map(|time_s| 20.0 + time_s / 3600.0).collect();

@@ -5,7 +5,6 @@ use std::path::Path;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
-use abbe_model::files;
 use abbe_model::frames::Point;
 use nalgebra::{DVector, Matrix3xX, Vector3};
 use rand::RngExt;
@@ -18,7 +17,7 @@ const REACH_DEG: f64 = 150.0;
 /// Writes the `data` files of the session's tests.
 pub fn write(folder: &Path, session: &Path) {
     let toml: toml::Table = std::fs::read_to_string(session).unwrap().parse().unwrap();
-    let machine = files::machine(Path::new(toml["machine"]["file"].as_str().unwrap())).unwrap();
+    let machine = abbe_files::machine(Path::new(toml["machine"]["file"].as_str().unwrap())).unwrap();
     for (stream, test) in toml["test"].as_array().unwrap().iter().enumerate() {
         let Some(file) = test.get("data") else { continue };
         let point = ["target_mm", "ball_mm"].iter().find_map(|key| test.get(*key)).unwrap();

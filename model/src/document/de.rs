@@ -20,7 +20,7 @@ use crate::words;
 const MAX_ITEMS: usize = 1000;
 
 /// What is expected in place of a value that is no list.
-pub(super) const LIST: &str = "a list in square brackets";
+pub const LIST: &str = "a list in square brackets";
 
 /// The field that takes the keys that a struct does not name.
 pub(super) const REST: &str = "$rest";

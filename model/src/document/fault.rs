@@ -15,23 +15,53 @@ pub enum Step {
     Item(usize),
 }
 
-/// What is wrong.
+/// What is wrong with a document.
 #[derive(Debug)]
-pub(super) enum Finding {
-    /// A message, and what to do.
-    Said { message: String, help: Option<String> },
+pub enum Finding {
+    /// A message.
+    Said {
+        /// The message.
+        message: String,
+        /// What to do.
+        help: Option<String>,
+    },
     /// What is said of the value: the message starts with its key.
-    OfKey { what: String, help: Option<String> },
+    OfKey {
+        /// The message after the key.
+        what: String,
+        /// What to do.
+        help: Option<String>,
+    },
     /// What is said of a table: the message starts with its name.
-    OfTable { what: String, help: Option<String> },
+    OfTable {
+        /// The message after the name.
+        what: String,
+        /// What to do.
+        help: Option<String>,
+    },
     /// A value of another type or word than this one.
     Unexpected(String),
     /// A key that the table does not have.
-    UnknownKey { key: String, known: Vec<String> },
-    /// A required key that is absent; `what` says what to add, if its schema does not.
-    MissingKey { key: String, what: Option<String> },
+    UnknownKey {
+        /// The key.
+        key: String,
+        /// The keys that the table may have.
+        known: Vec<String>,
+    },
+    /// A required key that is absent.
+    MissingKey {
+        /// The key.
+        key: String,
+        /// What to add, if its schema does not say it.
+        what: Option<String>,
+    },
     /// A file that is named and does not exist, or must not be read.
-    File { message: String, help: String },
+    File {
+        /// The message.
+        message: String,
+        /// What to do.
+        help: String,
+    },
     /// An error that has its place already.
     Other(Box<ModelError>),
 }
@@ -57,14 +87,15 @@ impl From<Option<String>> for Help {
     }
 }
 
-/// A fault of a document. `Parsed::error_of` finds its place in a file.
+/// A fault of a document. The reader of its file finds its place there.
 #[derive(Debug)]
 pub struct Fault {
-    pub(super) finding: Finding,
-    /// From the value outwards.
-    pub(super) path: Vec<Step>,
+    /// What is wrong.
+    pub finding: Finding,
+    /// The path of keys from the value outwards.
+    pub path: Vec<Step>,
     /// Whether it points at the key rather than at the value.
-    pub(super) on_key: bool,
+    pub on_key: bool,
 }
 
 impl Fault {
@@ -130,7 +161,7 @@ impl Fault {
     }
 
     /// The key that is unknown, if that is the fault.
-    pub(super) fn unknown(&self) -> Option<&str> {
+    pub fn unknown(&self) -> Option<&str> {
         match &self.finding {
             Finding::UnknownKey { key, .. } => Some(key),
             _ => None,
@@ -138,7 +169,7 @@ impl Fault {
     }
 
     /// The same, if a key is unknown, with more that are known.
-    pub(super) fn also_known(mut self, keys: impl IntoIterator<Item = String>) -> Fault {
+    pub fn also_known(mut self, keys: impl IntoIterator<Item = String>) -> Fault {
         if let Finding::UnknownKey { known, .. } = &mut self.finding {
             known.extend(keys);
         }
@@ -146,7 +177,7 @@ impl Fault {
     }
 
     /// The same, if a key is absent, with what it is.
-    pub(crate) fn explained(mut self, meaning: impl Fn(&str) -> Option<String>) -> Fault {
+    pub fn explained(mut self, meaning: impl Fn(&str) -> Option<String>) -> Fault {
         if let Finding::MissingKey { key, what } = &mut self.finding {
             *what = what.take().or_else(|| meaning(key));
         }

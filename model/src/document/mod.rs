@@ -1,10 +1,10 @@
 //! The documents of users: every key of every file, once.
 //!
 //! A document is a value of serde types. Their fields are the keys, and their doc comments are the documentation and the
-//! schema. It comes from a TOML file, from JSON or from a Python dict, by way of one tree of values ([`node`]), and
-//! `lower` turns it into the domain of [`session`](crate::session). A fault has the path of keys that leads to it
-//! ([`fault`]); `source` finds its place in the file. [`of_domain`] goes the other way, [`mod@print`] writes a document, and
-//! [`edit`] edits the text of a user.
+//! schema. It comes from a TOML file, from JSON or from a Python dict, by way of one tree of values ([`node`]). The crate
+//! `abbe-files` reads the tree from a text and turns the document into the domain of [`session`](crate::session). A fault
+//! has the path of keys that leads to it ([`fault`]), by which that crate finds its place in the file. [`of_domain`] goes
+//! from the domain to documents, [`mod@print`] writes a document, and [`edit`] edits the text of a user.
 
 #![allow(rustdoc::broken_intra_doc_links, reason = "the schema has the same texts, with `[machine]` for a table")]
 
@@ -14,7 +14,6 @@ pub mod effect;
 pub mod fault;
 pub mod kind;
 pub mod layout;
-pub(crate) mod lower;
 pub mod machine;
 pub mod movement;
 pub mod node;
@@ -22,10 +21,9 @@ pub mod of_domain;
 pub mod print;
 pub mod schema;
 pub mod session;
-pub mod source;
 pub mod test;
 pub mod tolerance;
 pub mod value;
 
-pub(crate) use de::from_node;
+pub use de::{LIST, from_node};
 pub use fault::Fault;

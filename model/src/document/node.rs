@@ -6,8 +6,6 @@ use std::ops::Range;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use serde_json::value::RawValue;
-use toml::de::{DeTable, DeValue};
 
 use super::fault::Step;
 use crate::session::limits;
@@ -128,42 +126,6 @@ impl Node {
         Value::Table(entries.into_iter().map(entry).collect()).into()
     }
 
-    /// A table of a TOML text.
-    pub(super) fn of_toml(table: DeTable<'_>, span: Range<usize>) -> Node {
-        let mut entries: Vec<Entry> = table
-            .into_iter()
-            .map(|(key, value)| Entry {
-                key_span: key.span(),
-                key: key.into_inner().into_owned(),
-                node: of_value(value.span(), value.into_inner()),
-            })
-            .collect();
-        entries.sort_by_key(|entry| entry.key_span.start);
-        Node { value: Value::Table(entries), span }
-    }
-
-    /// A value of a JSON text that is a part of the whole text.
-    pub(super) fn of_json(raw: &RawValue, whole: &str) -> serde_json::Result<Node> {
-        let text = raw.get();
-        let start = text.as_ptr() as usize - whole.as_ptr() as usize;
-        let value = match text.as_bytes().first() {
-            Some(b'{') => {
-                let pairs: Named<&RawValue> = serde_json::from_str(text)?;
-                let entries = pairs.0.into_iter().map(|(key, raw)| {
-                    let node = Node::of_json(raw, whole)?;
-                    Ok(Entry { key, key_span: node.span.clone(), node })
-                });
-                Value::Table(entries.collect::<serde_json::Result<_>>()?)
-            }
-            Some(b'[') => {
-                let items: Vec<&RawValue> = serde_json::from_str(text)?;
-                Value::List(items.into_iter().map(|raw| Node::of_json(raw, whole)).collect::<serde_json::Result<_>>()?)
-            }
-            _ => Node::from(serde_json::from_str::<serde_json::Value>(text)?).value,
-        };
-        Ok(Node { value, span: start..start + text.len() })
-    }
-
     /// The entries of a table; none of any other value.
     pub fn entries(&self) -> &[Entry] {
         match &self.value {
@@ -217,7 +179,7 @@ impl Node {
     }
 
     /// What a path leads to, and the entry of the last key on it; as far as it goes.
-    pub(super) fn follow<'n>(&'n self, path: impl Iterator<Item = &'n Step>) -> (&'n Node, Option<&'n Entry>) {
+    pub fn follow<'n>(&'n self, path: impl Iterator<Item = &'n Step>) -> (&'n Node, Option<&'n Entry>) {
         let (mut node, mut entry) = (self, None);
         for step in path {
             let next = match step {
@@ -231,7 +193,7 @@ impl Node {
     }
 
     /// What was found, for messages.
-    pub(super) fn found(&self) -> String {
+    pub fn found(&self) -> String {
         match &self.value {
             Value::Null => "nothing".to_string(),
             Value::Text(text) => format!("the text \"{text}\""),
@@ -243,29 +205,6 @@ impl Node {
             Value::Table(_) => "a table".to_string(),
         }
     }
-}
-
-fn of_value(span: Range<usize>, value: DeValue<'_>) -> Node {
-    let value = match value {
-        DeValue::String(text) => Value::Text(text.into_owned()),
-        DeValue::Integer(integer) => {
-            let digits = integer.as_str().replace('_', "");
-            let number = i64::from_str_radix(&digits, integer.radix()).map(|integer| integer as f64);
-            // A value that is too large for an integer is still a number.
-            let number = number.or_else(|_| digits.parse()).unwrap_or(f64::NAN);
-            Value::Number(number, integer.as_str().to_string())
-        }
-        DeValue::Float(float) => {
-            Value::Number(float.as_str().replace('_', "").parse().unwrap_or(f64::NAN), float.as_str().to_string())
-        }
-        DeValue::Boolean(truth) => Value::Truth(truth),
-        DeValue::Datetime(date) => Value::Date(date.to_string()),
-        DeValue::Array(items) => {
-            Value::List(items.into_iter().map(|item| of_value(item.span(), item.into_inner())).collect())
-        }
-        DeValue::Table(table) => return Node::of_toml(table, span),
-    };
-    Node { value, span }
 }
 
 /// Checks a number of a document: it is no NaN and not too large, but may be infinite.

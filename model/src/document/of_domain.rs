@@ -1,8 +1,7 @@
 //! From the domain to documents, which read back to the same bits.
 
-use super::effect;
+use super::effect::{self, SCALES, internal};
 use super::kind::Kind;
-use super::lower::effect::{SCALES, internal};
 use super::machine::{Axis, Machine};
 use super::movement::{Circle, Follow, Line, Path, Sweep};
 use super::node::Named;
@@ -84,23 +83,6 @@ pub fn effect(effect: &Effect, machine: &chain::Machine) -> effect::Effect {
 
 /// A planned test of a session with this instrument, with the positions of the axes that it does not move. `None` for a test
 /// without a motion of its own.
-///
-/// ```
-/// use abbe_model::chain::Machine;
-/// use abbe_model::document::{of_domain, print};
-/// use abbe_model::files::read::add_node;
-/// use abbe_model::session::Session;
-/// use serde_json::json;
-///
-/// let mut session = Session::new(Machine::from_code("wCAbYXZt")?, "ballbar".parse()?);
-/// let turn = json!({"axis": "C", "from_deg": 0, "to_deg": 360, "step_deg": 1});
-/// let test = json!({"name": "C100", "bar_mm": 125, "workpiece_ball_mm": [0, 100, 0], "spindle_ball_mm": [0, 0, 0],
-///                   "at": {"z_mm": 75}, "sweep": turn});
-/// add_node(&mut session, "test", test.into(), &[])?;
-/// let text = print::text_of(&of_domain::test(&session.tests[0], &session.machine, session.instrument))?;
-/// assert!(text.starts_with("name = \"C100\"\nbar_mm = 125\n"), "{text}");
-/// # Ok::<(), abbe_model::ModelError>(())
-/// ```
 pub fn test(test: &DomainTest, machine: &chain::Machine, instrument: InstrumentKind) -> Option<Test> {
     let (moved, sweep, path) = motion(test.motion.as_ref()?, machine)?;
     let mut set_up = test.station.written(&test.priors)?;

@@ -58,7 +58,7 @@ pub fn fields<T: JsonSchema>() -> Vec<String> {
 }
 
 /// The keys of a shape, with the suffix of every unit.
-pub(crate) fn shape_keys(entry: &Entry) -> Vec<String> {
+pub fn shape_keys(entry: &Entry) -> Vec<String> {
     entry.keys.iter().flat_map(names).collect()
 }
 
@@ -80,7 +80,7 @@ pub fn share(schema: &mut Value) {
 }
 
 /// What a key of the table at a path is in a schema, as the end of a sentence; or in the schema of its machine.
-pub(crate) fn meaning(schema: &Value, path: &[Step], key: &str) -> Option<String> {
+pub fn meaning(schema: &Value, path: &[Step], key: &str) -> Option<String> {
     let property = [schema, &schema["$defs"]["machine"]].into_iter().find_map(|root| {
         let tables = path.iter().fold(alternatives(schema, root), |tables, step| {
             let inner = tables.into_iter().filter_map(|table| match step {

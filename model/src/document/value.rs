@@ -35,7 +35,7 @@ impl Length {
     ///
     /// # Errors
     /// If it is no expression in the constants, infinite or too large for its key.
-    pub(crate) fn evaluated(&self, key: &str, constants: &[Constant]) -> Result<(expression::Length, f64), Fault> {
+    pub fn evaluated(&self, key: &str, constants: &[Constant]) -> Result<(expression::Length, f64), Fault> {
         let text = match self {
             Length::Number(number) if number.is_finite() => return Ok((expression::Length::Number(*number), *number)),
             Length::Number(_) => return Err(Fault::is("infinite; a length is expected")),

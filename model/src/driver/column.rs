@@ -21,7 +21,7 @@ pub(super) struct Column<'a>(pub &'a str);
 /// The column of the ambient temperature.
 pub const TEMPERATURE: &str = "temperature_c";
 /// The prefix of driver columns in data files and in `[columns]`.
-pub(crate) const PREFIX: &str = "driver.";
+pub const PREFIX: &str = "driver.";
 
 /// A unit of driver columns.
 struct ColumnUnit {
@@ -92,7 +92,7 @@ pub(crate) fn is_name(text: &str) -> bool {
 }
 
 /// The name of a column without its unit.
-pub(crate) fn quantity(name: &str) -> &str {
+pub fn quantity(name: &str) -> &str {
     parts(name).map_or(name, |(quantity, _)| quantity)
 }
 
@@ -102,13 +102,13 @@ pub fn in_files(name: &str) -> Cow<'static, str> {
 }
 
 /// The column with this name in data files; `None` if it is no driver column.
-pub(crate) fn of_files(name: &str) -> Option<&str> {
+pub fn of_files(name: &str) -> Option<&str> {
     let own = if name == TEMPERATURE { name } else { name.strip_prefix(PREFIX)? };
     is_name(own).then_some(own)
 }
 
 /// What to do about a driver column whose name is invalid.
-pub(crate) fn help_on_name() -> String {
+pub fn help_on_name() -> String {
     let suffixes: Vec<String> = UNITS.iter().map(|known| format!("_{}", known.unit.file)).collect();
     format!(
         "a driver column is `{PREFIX}NAME_unit`, such as `{PREFIX}spindle_temperature_c`; NAME has ASCII letters, digits \

@@ -8,7 +8,6 @@ mod reference;
 mod sample;
 mod unit;
 
-pub use column::{TEMPERATURE, in_files as name_in_files};
 pub use kind::{DriverFault, DriverInput, DriverKind, Entry, Recorded, SymbolInput, Symbols};
 pub use quantity::DriverQuantity;
 pub use reference::Reference;
@@ -24,8 +23,8 @@ use crate::scalar::Nominal;
 
 /// Declares the modules, the enumeration and the list of all drivers.
 macro_rules! drivers {
-    ($($module:ident: $driver:ident $(($name:ident))? => $kind:expr,)+) => {
-        $(pub(crate) mod $module;)+
+    ($($visibility:vis $module:ident: $driver:ident $(($name:ident))? => $kind:expr,)+) => {
+        $($visibility mod $module;)+
 
         /// The independent variable of an effect.
         #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -67,7 +66,7 @@ drivers! {
     none: None => none::NoDriver,
     axis: Axis(name) => axis::AxisDriver(name),
     time: Time => time::Time,
-    column: Column(name) => column::Column(name),
+    pub column: Column(name) => column::Column(name),
     gravity: Gravity => gravity::Gravity { at: None },
     gravity_at: GravityAt(name) => gravity::Gravity { at: Some(name) },
     speed_squared: SpeedSquared => speed_squared::SpeedSquared,

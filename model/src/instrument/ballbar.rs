@@ -17,7 +17,7 @@ use super::{Contact,
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
-use crate::files::quantity::MICROMETRE;
+use crate::quantity::MICROMETRE;
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;

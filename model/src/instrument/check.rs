@@ -2,7 +2,7 @@
 
 use super::channel::Channel;
 use super::kind::{Checked, Fault};
-use crate::files::quantity::ARCSECOND;
+use crate::quantity::ARCSECOND;
 
 /// The sensor range is one to two millimetres for a ball bar and a few for an R-test. A larger deviation is not an
 /// error of the machine, mm.

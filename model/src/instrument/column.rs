@@ -22,11 +22,11 @@ pub enum Quantity {
 }
 
 /// The channels of a rotation that a quaternion can state.
-pub(crate) const OF_ROTATION: std::ops::Range<usize> = 3..6;
+pub const OF_ROTATION: std::ops::Range<usize> = 3..6;
 
 impl Quantity {
     /// The channel that the column holds, among all that the instrument can have.
-    pub(crate) fn channel(self) -> Option<usize> {
+    pub fn channel(self) -> Option<usize> {
         match self {
             Quantity::Length | Quantity::Deviation | Quantity::Outward => Some(0),
             Quantity::Channel(channel) | Quantity::FromNominal(channel) | Quantity::Polar(channel) => Some(channel),
@@ -35,7 +35,7 @@ impl Quantity {
     }
 
     /// Whether two columns state the same.
-    pub(crate) fn is_same_as(self, other: Quantity) -> bool {
+    pub fn is_same_as(self, other: Quantity) -> bool {
         match (self, other) {
             (Quantity::Quaternion(_), _) | (_, Quantity::Quaternion(_)) if self != other => {
                 let channel = self.channel().or(other.channel());
@@ -70,7 +70,7 @@ impl Column {
     }
 
     /// Whether it is an angle.
-    pub(crate) fn is_angle(&self) -> bool {
+    pub fn is_angle(&self) -> bool {
         matches!(self.unit, "arcsec" | "deg")
     }
 

@@ -15,7 +15,7 @@ use super::{Aligned, Travel,
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
-use crate::files::quantity::MICROMETRE;
+use crate::quantity::MICROMETRE;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::expression::Constant;

@@ -30,7 +30,7 @@ use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
-use crate::files::quantity::ARCSECOND;
+use crate::quantity::ARCSECOND;
 use crate::frames::{Point, cross, dot, dot_nominal};
 use crate::rotation_error::Body;
 use crate::scalar::{Nominal, Scalar};

@@ -11,7 +11,7 @@ use crate::document::node::{Node, Value};
 use crate::document::print::node_of;
 use crate::document::value::{self as document, Point, Three, Uncertainties, Uncertainty};
 use crate::document::{from_node, schema};
-use crate::files::quantity::{ARCSECOND, MICROMETRE};
+use crate::quantity::{ARCSECOND, MICROMETRE};
 use crate::session::Prior;
 use crate::session::expression::{Constant, Length};
 use crate::session::limits;

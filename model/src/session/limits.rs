@@ -31,13 +31,13 @@ pub fn too_large_for(name: &str, number: f64) -> Option<String> {
 }
 
 /// The fault of a standard deviation or step in µm that is neither zero nor at least [`MIN_UM`].
-pub(crate) fn too_small_um(number: f64) -> Option<String> {
+pub fn too_small_um(number: f64) -> Option<String> {
     (number > 0.0 && number < MIN_UM)
         .then(|| format!("{} µm; the least value other than 0 is {MIN_UM:e} µm", words::number(number)))
 }
 
 /// A number above zero, or what is wrong with it.
-pub(crate) fn positive(number: f64) -> Result<f64, String> {
+pub fn positive(number: f64) -> Result<f64, String> {
     if number > 0.0 { Ok(number) } else { Err(format!("{}; it must be greater than 0", words::number(number))) }
 }
 

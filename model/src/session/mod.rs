@@ -1,8 +1,8 @@
 //! Sessions: a machine, a plan of tests, and the readings of the tests that were run.
 //!
-//! A session is validated and in mm, rad and s. [`files`](crate::files) reads it, from files or memory, and writes it.
+//! A session is validated and in mm, rad and s. The crate `abbe-files` reads it, from files or memory,
+//! and writes it.
 
-pub(crate) mod check;
 pub mod contributors;
 pub mod expression;
 pub mod limits;
@@ -10,12 +10,9 @@ pub mod motion;
 pub mod moves;
 pub mod placing;
 pub mod planned;
-pub(crate) mod plausibility;
 pub mod readings;
-mod runs;
-pub(crate) mod setups;
 pub mod tolerance;
-pub(crate) mod trajectory;
+pub mod trajectory;
 
 use std::sync::Arc;
 
@@ -127,23 +124,6 @@ impl Session {
         Some(positive(self.noise_mm)? / positive(self.noise_rad)?)
     }
 
-    /// The warning about a noise of a unit in which no channel reads, while that of the channels is not stated.
-    pub(crate) fn noise_of_no_channel(&self) -> Option<String> {
-        let units = self.units();
-        let unused =
-            |stated: Option<f64>, other: Option<f64>, reads: bool| stated.is_some() && other.is_none() && !reads;
-        let of = |stated: &str, needed: &str, unit: &str| {
-            Some(format!("`{stated}` is the noise of {unit}, which no test reads: state `{needed}`"))
-        };
-        if unused(self.noise_mm, self.noise_rad, units.lengths || !units.angles) {
-            return of("noise_um", "noise_arcsec", "lengths");
-        }
-        if unused(self.noise_rad, self.noise_mm, units.angles || !units.lengths) {
-            return of("noise_arcsec", "noise_um", "angles");
-        }
-        None
-    }
-
     /// The keys of noise that the session does not state, of the units in which its channels read.
     pub fn keys_of_noise(&self) -> &'static str {
         let units = self.units();
@@ -195,7 +175,7 @@ fn instruments(other: InstrumentKind, tests: &[Test]) -> Vec<InstrumentKind> {
 }
 
 /// The parameters of the instruments of tests, each once; those of `other` without tests.
-pub(crate) fn instrument_parameters(other: InstrumentKind, tests: &[Test]) -> Vec<InstrumentParameter> {
+pub fn instrument_parameters(other: InstrumentKind, tests: &[Test]) -> Vec<InstrumentParameter> {
     parameters_of(&instruments(other, tests))
 }
 

@@ -3,8 +3,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::axis::AxisKind;
-
 /// Largest number of readings of one planned test.
 pub const MAX_READINGS: usize = 1_000_000;
 
@@ -95,19 +93,6 @@ pub enum Motion {
     List,
 }
 
-/// Default feed of a linear axis or a circle, mm/s: 1000 mm/min.
-pub(crate) const DEFAULT_FEED_MM_S: f64 = 1000.0 / 60.0;
-/// Default speed of a rotary axis, rad/s: 120 °/min.
-const DEFAULT_ROTARY_SPEED_RAD_S: f64 = 2.0 / 180.0 * std::f64::consts::PI;
-
-/// The speed of an axis for which none is stated, mm/s or rad/s.
-pub(crate) fn default_speed(kind: AxisKind) -> f64 {
-    match kind {
-        AxisKind::Linear => DEFAULT_FEED_MM_S,
-        AxisKind::Rotary => DEFAULT_ROTARY_SPEED_RAD_S,
-    }
-}
-
 /// Direction of the bar while linear axes follow a rotary axis (ISO 10791-6, BK1 and BK2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
@@ -148,16 +133,6 @@ pub fn programmed_over_path_feed(radius_mm: f64) -> f64 {
 }
 
 /// The length of a line of linear axes from the positions at its ends, mm.
-pub(crate) fn length_of(ends: &[[f64; 2]]) -> f64 {
+pub fn length_of(ends: &[[f64; 2]]) -> f64 {
     ends.iter().map(|[start, end]| (end - start).powi(2)).sum::<f64>().sqrt()
-}
-
-/// The axes that a motion names.
-pub(crate) fn named_axes(motion: Option<&Motion>) -> Vec<usize> {
-    match motion {
-        Some(Motion::Sweep { axis, .. } | Motion::Follow { axis, .. }) => vec![*axis],
-        Some(Motion::Circle { first, second, .. }) => vec![*first, *second],
-        Some(Motion::Line { axes, .. }) => axes.clone(),
-        Some(Motion::List) | None => Vec::new(),
-    }
 }

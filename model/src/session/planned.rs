@@ -3,7 +3,6 @@
 use super::motion::Motion;
 use super::readings::Readings;
 use super::{Session, Test, trajectory};
-use crate::axis::AxisKind;
 use crate::chain::Machine;
 use crate::error::ModelError;
 use crate::instrument::{Checked, Station};
@@ -63,7 +62,7 @@ pub fn planned_session(session: &Session) -> Result<Vec<Readings>, ModelError> {
 }
 
 /// As [`planned`], with an error as message and help.
-pub(crate) fn checked_plan(machine: &Machine, test: &Test) -> Result<Readings, (String, String)> {
+pub fn checked_plan(machine: &Machine, test: &Test) -> Result<Readings, (String, String)> {
     let mut readings = match &test.motion {
         Some(Motion::List) | None => {
             let Some(data) = &test.readings else {
@@ -88,7 +87,7 @@ pub(crate) fn checked_plan(machine: &Machine, test: &Test) -> Result<Readings, (
 }
 
 /// A description of the first axis that exceeds its travel.
-pub(crate) fn beyond_travel(machine: &Machine, readings: &Readings) -> Option<String> {
+pub fn beyond_travel(machine: &Machine, readings: &Readings) -> Option<String> {
     machine.axes.iter().zip(&readings.positions).find_map(|(axis, positions)| {
         let [least, greatest] = axis.travel?;
         let slack = 1e-9 * (1.0 + least.abs().max(greatest.abs()));
@@ -105,28 +104,9 @@ pub(crate) fn beyond_travel(machine: &Machine, readings: &Readings) -> Option<St
     })
 }
 
-/// Turns beyond which the positions of a rotary axis are doubted. Degrees in a column of radians are 57 times as far.
-const MANY_TURNS: f64 = 10.0;
-
-/// A description of the first rotary axis whose positions are many turns from zero.
-pub(crate) fn many_turns(machine: &Machine, readings: &Readings) -> Option<String> {
-    machine.axes.iter().zip(&readings.positions).find_map(|(axis, positions)| {
-        let turns = |position: &f64| position.abs() / std::f64::consts::TAU;
-        let farthest = positions.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
-        (axis.kind == AxisKind::Rotary && turns(&farthest) > MANY_TURNS).then(|| {
-            format!(
-                "axis `{}` goes to {:.3} deg, {:.0} turns from zero, as degrees in a column of radians would",
-                axis.name,
-                axis.kind.to_display(farthest),
-                turns(&farthest),
-            )
-        })
-    })
-}
-
 /// Sets linear axes that a circle does not move, and that the test does not state, so that the centre of the circle
 /// lies in its plane.
-pub(crate) fn centre_circle(
+pub fn centre_circle(
     machine: &Machine,
     station: &Station<f64>,
     motion: Option<&Motion>,

@@ -169,7 +169,7 @@ fn traversals(
 }
 
 /// Positions of the axes at these angles of a test's circle; `None` for another motion.
-pub(crate) fn on_circle(machine: &Machine, test: &Test, angles: &[f64]) -> Option<Result<Vec<Vec<f64>>, Fault>> {
+pub fn on_circle(machine: &Machine, test: &Test, angles: &[f64]) -> Option<Result<Vec<Vec<f64>>, Fault>> {
     let Some(Motion::Circle { first, second, radius, centre, .. }) = &test.motion else {
         return None;
     };
@@ -224,7 +224,7 @@ impl Circle {
 }
 
 /// The circle of a test: its two axes, their positions at the centre, and the amplitude of each, mm.
-pub(crate) fn circle_of(machine: &Machine, test: &Test) -> Option<([usize; 2], [f64; 2], [f64; 2])> {
+pub fn circle_of(machine: &Machine, test: &Test) -> Option<([usize; 2], [f64; 2], [f64; 2])> {
     let Some(Motion::Circle { first, second, radius, centre, .. }) = &test.motion else { return None };
     let none = BallBar { workpiece_ball: [0.0; 3], spindle_ball: [0.0; 3], bar: 0.0 };
     let bar = bar_between_points(&test.station).unwrap_or(none);

@@ -6,15 +6,15 @@
 
 use std::collections::HashMap;
 
-use abbe_model::session::Prior;
-use faer::{Mat, MatRef};
-
-use crate::PlanError;
 use abbe_identify::IdentifyError;
 use abbe_identify::linear::Linearisation;
 use abbe_identify::numerics::reduction::inverse_of_upper;
 use abbe_identify::numerics::triangle::upper;
 use abbe_identify::problem::Problem;
+use abbe_model::session::Prior;
+use faer::{Mat, MatRef};
+
+use crate::PlanError;
 
 /// The parameters that tests share, in column order. The target parameters are last.
 #[derive(Clone, Debug)]
@@ -155,20 +155,20 @@ pub fn sum_of<'m>(parts: impl Iterator<Item = MatRef<'m, f64>>) -> Root {
 mod tests {
     use std::path::Path;
 
-    use abbe_model::files::{self, ReadOptions};
+    use abbe_files::ReadOptions;
+    use abbe_identify::noise::{Noise, NoiseSource};
+    use abbe_identify::parameters::Role;
     use faer::linalg::solvers::Solve;
 
     use super::*;
     use crate::states;
-    use abbe_identify::noise::{Noise, NoiseSource};
-    use abbe_identify::parameters::Role;
 
     /// The information on the errors of the machine is the Schur complement of that on the set-up, whose priors are those
     /// of the session: `A − B (C + diag(u⁻²))⁻¹ Bᵀ`.
     #[test]
     fn a_test_informs_within_the_priors_of_its_set_up() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/chapter5.toml");
-        let mut session = files::session(&file, &ReadOptions::default()).unwrap();
+        let mut session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
         session.tests.truncate(1);
         let plan = states::complete(&session, true).unwrap();
         let problem = states::problem_by_test(&plan, Noise::white(3e-4, NoiseSource::Stated)).unwrap();

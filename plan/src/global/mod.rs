@@ -21,15 +21,6 @@
 mod indices;
 mod sequence;
 
-use abbe_model::session::Prior;
-use faer::Mat;
-use rand_distr::{Distribution, StandardNormal};
-use rand_pcg::Pcg64;
-use schemars::JsonSchema;
-use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, Normal};
-
-use crate::PlanError;
 use abbe_identify::IdentifyError;
 use abbe_identify::candidates::columns::Columns;
 use abbe_identify::candidates::library;
@@ -37,7 +28,16 @@ use abbe_identify::linear::{Linearisation, is_of_interest, prior_u};
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_identify::quantity::Given;
+use abbe_model::session::Prior;
+use faer::Mat;
 use indices::Design;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+use schemars::JsonSchema;
+use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use crate::PlanError;
 pub use indices::SobolIndex;
 
 /// Maximum number of steps of the chord method.
@@ -364,15 +364,15 @@ impl<'p> Plan<'p> {
 mod tests {
     use std::path::Path;
 
-    use abbe_model::files::{self, ReadOptions};
+    use abbe_files::ReadOptions;
+    use abbe_identify::noise::{Noise, NoiseSource};
 
     use super::*;
     use crate::{budget, states};
-    use abbe_identify::noise::{Noise, NoiseSource};
 
     fn problem_of(name: &str) -> Problem {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions").join(name);
-        let mut session = files::session(&file, &ReadOptions::default()).unwrap();
+        let mut session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
         session.tests.truncate(2);
         let plan = states::complete(&session, true).unwrap();
         states::problem_by_test(&plan, Noise::white(3e-4, NoiseSource::Stated)).unwrap()

@@ -3,6 +3,7 @@
 mod datum;
 mod mounts;
 
+use abbe_identify::series::paths::{SetUpPath, set_up};
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::instrument::ballbar::BallBar;
@@ -14,7 +15,6 @@ use abbe_model::session::{Prior, Session, Test};
 use crate::PlanError;
 use crate::collision::{self, TestClearance};
 use crate::states;
-use abbe_identify::series::paths::{SetUpPath, set_up};
 pub use datum::{Datum, datum};
 
 /// Times that the plan of a day needs, min.
@@ -222,7 +222,7 @@ fn poses(machine: &Machine, readings: &Readings) -> Vec<Vec<f64>> {
 mod tests {
     use std::path::Path;
 
-    use abbe_model::files::{self, ReadOptions};
+    use abbe_files::ReadOptions;
 
     use super::uncertainty_mm;
 
@@ -230,7 +230,7 @@ mod tests {
     fn balls_have_the_uncertainty_that_the_session_states() {
         let of = |name: &str| {
             let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions").join(name);
-            files::session(&file, &ReadOptions::default()).unwrap().tests.remove(0)
+            abbe_files::session(&file, &ReadOptions::default()).unwrap().tests.remove(0)
         };
         // `workpiece_ball_u_um = [2, 2, 2]`, `spindle_ball_u_um = [1, 1, 1]`.
         let test = of("hermle-c600u/chapter5.toml");

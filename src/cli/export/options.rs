@@ -2,8 +2,8 @@
 
 use abbe::apply::export::travel::Travel;
 use abbe::exports::{self, ExportOptions};
+use abbe::files;
 use abbe::identify::model_file::IdentifiedModel;
-use abbe::model::files;
 use abbe::model::words::cut;
 
 use super::ExportArguments;

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use abbe::apply::history::HistoryOptions;
 use abbe::document::StatedHistory;
+use abbe::files;
 use abbe::fleet::compensations;
 use abbe::fleet::history::{history, statements};
 use abbe::fleet::store::Store;
-use abbe::model::files;
 use clap::Args;
 
 use crate::cli::failure::Failure;

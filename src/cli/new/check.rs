@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use abbe::model::files::store::Store;
-use abbe::model::files::{ReadOptions, session_with_sources};
+use abbe::files::store::Store;
+use abbe::files::{ReadOptions, session_with_sources};
 use abbe::plan::design::Goal;
 use abbe::plan::poses::candidates::PoseLimits;
 use abbe::plan::poses::{PoseOptions, measured_by, select};

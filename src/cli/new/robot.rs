@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use abbe::model::files::robot::dh::Convention;
-use abbe::model::files::robot::{self, Measured, dh, urdf};
-use abbe::model::files::text;
+use abbe::files::robot::dh::Convention;
+use abbe::files::robot::{self, Measured, dh, urdf};
+use abbe::files::text;
 use clap::Args;
 
 use crate::cli::failure::Failure;

@@ -1,6 +1,6 @@
 //! `abbe new --from-code`: sizes of the machine.
 
-use abbe::model::files::template::Sizes;
+use abbe::files::template::Sizes;
 use clap::Args;
 
 /// Sizes of the machine of a code.

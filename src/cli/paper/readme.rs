@@ -1,6 +1,6 @@
 //! The README of a paper's folder.
 
-use abbe::model::files::SourceMap;
+use abbe::files::SourceMap;
 use abbe::model::session::Session;
 
 use super::PaperArguments;

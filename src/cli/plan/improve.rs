@@ -4,8 +4,8 @@ mod candidates;
 
 use std::path::PathBuf;
 
+use abbe::files::SourceMap;
 use abbe::identify::problem::Problem;
-use abbe::model::files::SourceMap;
 use abbe::plan::design::Goal;
 use abbe::plan::improve::{self, ImproveOptions, Improvement};
 use clap::Args;

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use abbe::codegen::nc::Control;
+use abbe::files::{self, ReadOptions, SourceMap};
 use abbe::identify::trace::TraceOutcome;
 use abbe::model::ModelError;
 use abbe::model::document::edit::SessionText;
 use abbe::model::effect::Effect;
-use abbe::model::files::{self, ReadOptions, SourceMap};
 use abbe::model::session::Session;
 use clap::Args;
 

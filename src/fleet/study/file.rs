@@ -3,6 +3,9 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
+use abbe_files::ReadOptions;
+use abbe_files::read::effect_of_document;
+use abbe_files::stamp::FileStamp;
 use abbe_identify::IdentifyError;
 use abbe_identify::simulate::{Simulation, simulate};
 use abbe_identify::trace::TraceOptions;
@@ -11,9 +14,6 @@ use abbe_model::document::effect::Effect as EffectDocument;
 use abbe_model::document::fault::{Fault, Within};
 use abbe_model::document::value::Count;
 use abbe_model::effect::Effect;
-use abbe_model::files::read::effect_of_document;
-use abbe_model::files::stamp::FileStamp;
-use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::Session;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -180,7 +180,7 @@ pub struct Study {
 /// # Errors
 /// With file and line or key of what cannot be used.
 pub fn read(path: &Path) -> Result<Study, FleetError> {
-    let source = files::text(path, "the study file")?;
+    let source = abbe_files::text(path, "the study file")?;
     let parsed = source.parse()?;
     let here = |fault: Fault| parsed.error_of(fault);
     let file: StudyFile = parsed.document()?;
@@ -193,7 +193,7 @@ pub fn read(path: &Path) -> Result<Study, FleetError> {
     for (item, plan) in file.plan.iter().enumerate() {
         let place = folder.join(&plan.session);
         let options = ReadOptions { allow_outside: true, ..ReadOptions::default() };
-        let (session, sources) = files::session_with_sources(&place, &options)?;
+        let (session, sources) = abbe_files::session_with_sources(&place, &options)?;
         for read in sources.files.iter().filter_map(FileStamp::read) {
             digest.update(read.sha256);
         }

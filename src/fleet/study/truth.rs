@@ -68,9 +68,9 @@ pub(super) fn chi_square(session: &Session, noise_mm: f64) -> Result<f64, Identi
 
 #[cfg(test)]
 mod tests {
+    use abbe_files::ReadOptions;
     use abbe_identify::trace::TraceOptions;
     use abbe_identify::trace::screening::screened_effects;
-    use abbe_model::files::{self, ReadOptions};
 
     use super::*;
 
@@ -79,7 +79,7 @@ mod tests {
     #[test]
     fn an_equal_effect_has_any_name() {
         let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("sessions/hermle-c600u/measured/session.toml");
-        let plan = files::session(&file, &ReadOptions::default()).unwrap();
+        let plan = abbe_files::session(&file, &ReadOptions::default()).unwrap();
         let library = screened_effects(&plan, &TraceOptions::default()).unwrap();
         let named = |id: &str| library.iter().find(|effect| effect.effect.id() == id).unwrap().effect.clone();
         let harmonic = named("EZC~C:h2");

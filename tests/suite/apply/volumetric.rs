@@ -11,7 +11,7 @@ use crate::suite::plan::topologies::{self, uniform};
 use crate::suite::{abbe, ready, text};
 
 fn machine() -> Machine {
-    abbe::model::files::machine(&ready("volumetric/machine.toml")).unwrap()
+    abbe::files::machine(&ready("volumetric/machine.toml")).unwrap()
 }
 
 fn errors(machine: &Machine) -> Vec<ErrorFunction> {

@@ -7,8 +7,8 @@ use std::process::Command;
 
 use abbe::codegen::print::{LANGUAGES, OutputLanguage, Style};
 use abbe::codegen::{Equation, Options, Order, SessionTest, Symbols, check};
+use abbe::files::{self, ReadOptions};
 use abbe::model::component::ErrorName;
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::frames::Rotation;
 
 use crate::suite::{abbe, ready, text};

@@ -9,9 +9,9 @@ use std::process::{Child, ChildStderr, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::results::TraceResult;
 use abbe::identify::trace::{Progress, TraceOptions, TraceOutcome, trace};
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 
 use crate::suite::{ready, text};

@@ -1,8 +1,8 @@
 //! `abbe new`: every template is a readable session.
 
 use abbe::apply::volumetric::functions;
+use abbe::files::{self, ReadOptions};
 use abbe::model::axis::AxisKind;
-use abbe::model::files::{self, ReadOptions};
 
 use crate::suite::{abbe, text};
 

@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::results::{EffectName, TraceResult, TraceVerdict};
 use abbe::identify::trace::{TraceOptions, trace};
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;

@@ -4,12 +4,12 @@
 use abbe::identify::results::GoodnessVerdict;
 use std::f64::consts::TAU;
 
+use abbe::files::read::add_node;
+use abbe::files::table::memory::MemoryColumn;
 use abbe::identify::circular::{CircularTest, of_session};
 use abbe::identify::tolerance::rule::Decision;
 use abbe::identify::tolerance::{ConformityItem, conformity};
 use abbe::model::chain::Machine;
-use abbe::model::files::read::add_node;
-use abbe::model::files::table::memory::MemoryColumn;
 use abbe::model::instrument::InstrumentKind;
 use abbe::model::instrument::ballbar::BAR;
 use abbe::model::session::tolerance::{Limit, TestFigure, Tolerance, Toleranced};

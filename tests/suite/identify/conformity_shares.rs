@@ -3,12 +3,12 @@
 
 use std::f64::consts::TAU;
 
+use abbe::files::read::add_node;
+use abbe::files::table::memory::MemoryColumn;
 use abbe::identify::SessionFit;
 use abbe::identify::tolerance::rule::Decision;
 use abbe::model::chain::Machine;
 use abbe::model::component::ErrorName;
-use abbe::model::files::read::add_node;
-use abbe::model::files::table::memory::MemoryColumn;
 use abbe::model::instrument::InstrumentKind;
 use abbe::model::session::Session;
 use abbe::model::session::tolerance::{Limit, Tolerance, Toleranced};

@@ -4,11 +4,11 @@
 use std::sync::Arc;
 
 use abbe::apply::geometric::{Estimator, Method, compare};
+use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::prepare;
 use abbe::identify::noise::{Noise, NoiseSource};
 use abbe::identify::numerics::circle;
 use abbe::identify::problem::Problem;
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::instrument::Station;
 use abbe::model::session::motion::Motion;
 use abbe::model::session::planned;

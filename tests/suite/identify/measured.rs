@@ -3,7 +3,7 @@
 //!
 //! `ABBE_WRITE_SESSIONS=1 cargo test --profile checked measured` writes it again.
 
-use abbe::model::files::{self, ReadOptions};
+use abbe::files::{self, ReadOptions};
 
 use crate::plant::{AxisName, Component, Driver, Freedom, Injected, Kind, Recipe, Shape, SimulatedSession};
 

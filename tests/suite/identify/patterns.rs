@@ -1,7 +1,7 @@
 //! The trace patterns of single errors (thesis, Figs. 3.7 and 3.8) against the first order of its Eqs. 3.20 and 3.21.
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::patterns::{patterns, usual_sizes};
-use abbe::model::files::{self, ReadOptions};
 
 use crate::suite::{abbe, ready, text};
 

@@ -8,10 +8,10 @@ mod precession;
 use std::fs;
 use std::path::Path;
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::{prepare, tpoint};
 use abbe::identify::results::{PointingTerm, PointingTerms};
 use abbe::model::component::ErrorName;
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 use nalgebra::{Rotation3, Unit, Vector3};
 use test_needs::data;

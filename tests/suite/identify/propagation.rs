@@ -1,12 +1,12 @@
 //! The full fit by Monte Carlo: the law of propagation for a linear model, a closed form for a nonlinear one.
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::monte_carlo::MonteCarlo;
 use abbe::identify::propagation::add_monte_carlo;
 use abbe::identify::quantity::Given;
 use abbe::identify::results::{DrawnParameter, FitMonteCarlo, Verdict};
 use abbe::identify::simulate::{Simulation, simulate};
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 
 use crate::suite::{abbe, ready, text};

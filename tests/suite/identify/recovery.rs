@@ -1,11 +1,11 @@
 //! The fit of a simulated session recovers the simulated errors: exactly without noise, and within the stated
 //! uncertainty with noise.
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::{Fit, prepare};
 use abbe::identify::problem::Problem;
 use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulation, simulate};
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::motion::Motion;
 use abbe::model::session::{Prior, Session};
 use rayon::prelude::*;

@@ -1,10 +1,10 @@
 //! Repeated sessions: the scatter of their fits against the standard uncertainties of the fits.
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::prepare;
 use abbe::identify::quantity::Given;
 use abbe::identify::repeated::{Repeated, Scatter, Session as Fitted, compare};
 use abbe::identify::simulate::{Simulation, simulate};
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 use rayon::prelude::*;
 

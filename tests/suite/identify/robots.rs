@@ -1,9 +1,9 @@
 //! Real measurements: a UR10 before a laser tracker, a KUKA iiwa 14 whose ball sits in sockets.
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::results::FitResult;
 use abbe::identify::series::{self, places};
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 use test_needs::data;
 

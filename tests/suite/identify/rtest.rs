@@ -3,12 +3,12 @@
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::sync::Arc;
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::directions::views;
 use abbe::identify::fit::prepare;
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::Machine;
 use abbe::model::component::ErrorName;
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::frames::{Point, Rotation};
 use abbe::model::instrument::rtest::{Orientation, RTest, Setting};
 use abbe::model::instrument::{InstrumentKind, Station};

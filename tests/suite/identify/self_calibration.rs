@@ -3,12 +3,12 @@
 
 use std::sync::Arc;
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::self_calibration::{
     Calibration, Equations, Function, MonteCarlo, Reference, calibrate, conditions, rank_before, reduce, solve,
 };
 use abbe::identify::simulate::{Simulation, simulate};
 use abbe::model::component::ErrorName;
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::instrument::Station;
 use abbe::model::instrument::probe::Probe;
 use abbe::model::sensitivity::{SlotValues, TestModel};

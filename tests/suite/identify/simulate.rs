@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use abbe::model::files::{self, ReadOptions};
+use abbe::files::{self, ReadOptions};
 use abbe::model::session::Session;
 
 use crate::plant;

@@ -4,11 +4,11 @@
 use std::fmt::Write;
 use std::fs;
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::noise::NoiseSource;
 use abbe::identify::results::{EffectResult, FitResult, GoodnessVerdict, TraceVerdict};
 use abbe::identify::trace::{TraceOptions, trace};
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 use nalgebra::{Rotation3, Unit, Vector3};
 use rand::{RngExt, SeedableRng};

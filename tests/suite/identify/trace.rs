@@ -1,12 +1,12 @@
 //! Trace on sessions of an independent simulator and on real robots. The program reads the readings only; the true
 //! effects are in other files or in the literature.
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::model_file::{IdentifiedModel, Provenance};
 use abbe::identify::results::TraceVerdict;
 use abbe::identify::results::{EffectName, TraceResult};
 use abbe::identify::trace::{TraceOptions, trace};
 use abbe::identify::validate::validate;
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 use test_needs::data;
 

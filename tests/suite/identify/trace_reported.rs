@@ -4,6 +4,7 @@
 use abbe::identify::results::TraceVerdict;
 use std::sync::Arc;
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::fit;
 use abbe::identify::noise::Noise;
 use abbe::identify::problem::Problem;
@@ -14,7 +15,6 @@ use abbe::identify::trace::{TraceOptions, trace};
 use abbe::model::driver::Driver;
 use abbe::model::effect::shape::{Harmonic, Local};
 use abbe::model::effect::{Component, Effect, Shape};
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 use abbe::plan::candidate_tests::candidate_tests;
 use abbe::plan::separating_tests::separate_aliases;

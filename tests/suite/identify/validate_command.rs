@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::base::{Gauge, base_parameters, report};
 use abbe::identify::fit::prepare;
 use abbe::identify::model_file::{IdentifiedModel, Provenance};
 use abbe::identify::parameters::Role;
 use abbe::identify::validate::validate;
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 use serde_json::{Value, json};
 

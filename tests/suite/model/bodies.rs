@@ -3,8 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
-use abbe::model::files::store::Store;
-use abbe::model::files::{self, ReadOptions};
+use abbe::files::store::Store;
+use abbe::files::{self, ReadOptions};
 use abbe::plan::collision::clearances;
 use abbe::plan::states;
 use serde_json::Value;

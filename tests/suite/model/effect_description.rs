@@ -3,6 +3,7 @@
 use std::collections::{BTreeSet, HashMap};
 use std::fmt::Write;
 
+use abbe::files::{ReadOptions, session as read};
 use abbe::identify::candidates::library;
 use abbe::identify::problem::Problem;
 use abbe::model::chain::Machine;
@@ -11,7 +12,6 @@ use abbe::model::driver::Driver;
 use abbe::model::effect::description::{component_meaning, explanations, meaning};
 use abbe::model::effect::shape::{Harmonic, Periodic, Power, Steps, Warmup};
 use abbe::model::effect::{Component, Effect, Shape};
-use abbe::model::files::{ReadOptions, session as read};
 use abbe::model::session::Session;
 
 use crate::suite::plan::help::{noise_um, ready};

@@ -7,6 +7,7 @@ mod machines;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::noise::{Noise, NoiseSource};
 use abbe::identify::problem::Problem;
@@ -16,7 +17,6 @@ use abbe::model::component::{ErrorKind, ErrorName, Freedom};
 use abbe::model::driver::Driver;
 use abbe::model::effect::shape::Periodic;
 use abbe::model::effect::{Component, Effect, Shape};
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::instrument::Station;
 use abbe::model::instrument::ballbar::BallBar;
 use abbe::model::instrument::rtest::{RTest, Setting};

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use abbe::model::files::{self, ReadOptions};
+use abbe::files::{self, ReadOptions};
 use abbe::plan::collision::{TestClearance, clearances};
 use abbe::plan::states;
 use rand::{RngExt, SeedableRng};

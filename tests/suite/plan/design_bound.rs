@@ -4,9 +4,9 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::noise::{Noise, NoiseSource};
 use abbe::identify::problem::RowBlock;
-use abbe::model::files::{self, ReadOptions};
 use abbe::plan::design::information::SharedParameters;
 use abbe::plan::design::{Design, Goal, bound};
 use abbe::plan::states;

@@ -1,8 +1,8 @@
 //! Helpers for the tests of plans: sessions from text.
 
+use abbe::files::{ReadOptions, session as read};
 use abbe::identify::linear::Linearisation;
 use abbe::identify::noise::{Noise, NoiseSource};
-use abbe::model::files::{ReadOptions, session as read};
 use abbe::model::session::Session;
 use abbe::plan::states;
 

@@ -4,8 +4,8 @@
 
 use std::sync::Arc;
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::prepare;
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::instrument::Station;
 use abbe::model::session::planned::planned;
 use abbe::model::session::{Session, Test};

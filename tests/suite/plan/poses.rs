@@ -1,8 +1,8 @@
 //! `abbe poses`: poses of the UR10 against random sets, the predicted uncertainty against simulation, limits.
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::fit;
 use abbe::model::component::ErrorName;
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 use abbe::model::session::readings::Readings;
 use abbe::plan::design::Goal;

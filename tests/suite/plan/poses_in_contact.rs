@@ -1,8 +1,8 @@
 //! `abbe poses` for sockets and probes: every pose meets the instrument's condition by the chain of the
 //! independent simulator, and simulated readings have the predicted uncertainty.
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::fit;
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::instrument::Station;
 use abbe::model::session::readings::Readings;
 use abbe::model::session::{Prior, Session, Test};

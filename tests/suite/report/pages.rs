@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::series::{Cause, sensitivities, views};
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 use abbe::plan::states;
 use test_needs::data;

@@ -3,16 +3,16 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use abbe_files::commands::CommandFile;
+use abbe_identify::model_file::errors::EstimatedEffect;
+use abbe_identify::model_file::errors::EstimatedErrors;
 use abbe_model::chain::Machine;
 use abbe_model::driver::{Driver, Reference};
 use abbe_model::effect::shape::{ReversalSpike, Shape};
 use abbe_model::effect::{Component, Effect};
-use abbe_model::files::commands::CommandFile;
 use abbe_model::instrument::Station;
 
 use super::*;
-use abbe_identify::model_file::errors::EstimatedEffect;
-use abbe_identify::model_file::errors::EstimatedErrors;
 
 /// A machine whose X lags behind its command by 1 ms, and whose Y has a spike of 3 µm after a reversal.
 fn errors() -> EstimatedErrors {

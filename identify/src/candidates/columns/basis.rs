@@ -344,8 +344,8 @@ fn cached<K: std::hash::Hash + Eq, V: Clone>(store: &Mutex<HashMap<K, V>>, key: 
 mod tests {
     use std::path::Path;
 
+    use abbe_files::ReadOptions;
     use abbe_model::effect::shape::{Harmonic, Polynomial};
-    use abbe_model::files::{self, ReadOptions};
 
     use super::*;
     use crate::fit::prepare;
@@ -354,7 +354,7 @@ mod tests {
     #[test]
     fn a_term_of_the_readings_acts_in_its_test_alone() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let session = files::session(&file, &ReadOptions::default()).unwrap();
+        let session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
         let (mut problem, fit) = prepare(&session, 1).unwrap();
         let effect = Effect::new(Component::Reading(problem.tests[1].name.clone()), Driver::None, Shape::Constant);
         let columns = Columns::new(&problem, &fit.beta);
@@ -376,7 +376,7 @@ mod tests {
     #[test]
     fn the_largest_plausible_coefficient_moves_the_component_by_a_tenth_of_its_size() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let session = files::session(&file, &ReadOptions::default()).unwrap();
+        let session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
         let (problem, fit) = prepare(&session, 1).unwrap();
         let columns = Columns::new(&problem, &fit.beta);
         let plausible = |component: &str, driver: &str, shape: Shape| {

@@ -254,7 +254,7 @@ fn sensitivities(problem: &Problem, beta: &[f64]) -> Vec<Sensitivities> {
 mod tests {
     use std::path::Path;
 
-    use abbe_model::files::{self, ReadOptions};
+    use abbe_files::ReadOptions;
 
     use super::*;
     use crate::fit::prepare;
@@ -263,7 +263,7 @@ mod tests {
     #[test]
     fn sensitivities_match_their_tests_if_one_has_no_readings() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let mut session = files::session(&file, &ReadOptions::default()).unwrap();
+        let mut session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
         let without = session.tests[1].readings.as_ref().unwrap().of_rows(&[]);
         session.tests[1].readings = Some(std::sync::Arc::new(without));
         let (problem, fit) = prepare(&session, 1).unwrap();

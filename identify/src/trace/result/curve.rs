@@ -135,10 +135,10 @@ pub(super) fn curve_units(problem: &Problem, effect: &Effect) -> (String, String
 mod tests {
     use std::path::Path;
 
+    use abbe_files::ReadOptions;
     use abbe_model::driver::Driver;
     use abbe_model::effect::Component;
     use abbe_model::effect::shape::Curve;
-    use abbe_model::files::{self, ReadOptions};
 
     use super::*;
     use crate::fit::{AliasChange, EffectAliases, fit, prepare};
@@ -146,7 +146,7 @@ mod tests {
     #[test]
     fn the_band_of_a_curve_is_enlarged_as_every_uncertainty_is_and_covers_what_aliases_move() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let session = files::session(&file, &ReadOptions::default()).unwrap();
+        let session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
         let (mut problem, _) = prepare(&session, 1).unwrap();
         let turn = 360_f64.to_radians();
         problem

@@ -133,10 +133,10 @@ mod tests {
     use std::path::Path;
     use std::sync::Arc;
 
+    use abbe_files::ReadOptions;
     use abbe_model::driver::Driver;
     use abbe_model::effect::shape::Steps;
     use abbe_model::effect::{Component, Shape};
-    use abbe_model::files::{self, ReadOptions};
 
     use super::*;
     use crate::fit::{fit, prepare};
@@ -161,7 +161,7 @@ mod tests {
     #[test]
     fn an_interval_ends_where_full_fits_have_risen_by_the_quantile() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let (mut problem, _) = prepare(&files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
+        let (mut problem, _) = prepare(&abbe_files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
         let truth = with_steps(&problem, AT);
         let mut beta = vec![0.0; truth.parameters.list.len()];
         let before = truth.residuals(&beta);

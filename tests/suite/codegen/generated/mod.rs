@@ -12,9 +12,9 @@ mod pulls;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulation, simulate};
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::instrument::Station;
 use abbe::model::instrument::ballbar::BallBar;
 use abbe::model::session::planned::planned_session;

@@ -10,10 +10,10 @@ mod noise;
 mod scatter;
 mod stands;
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::{self, prepare};
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::{AxisPosition, BodyErrors, Machine};
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::instrument::angle::Angle;
 use abbe::model::instrument::column::Quantity;
 use abbe::model::instrument::distance::{Distance, StationFrame};

@@ -4,11 +4,11 @@
 mod poses;
 mod sessions;
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::plausibility::{Plausibility, Pulls, Suggestion, SuggestionKind, examine, warnings};
 use abbe::identify::results::TraceVerdict;
 use abbe::identify::trace::{TraceOptions, trace};
-use abbe::model::files::{self, ReadOptions};
 
 use crate::plant::Noise;
 use sessions::{MISTAKES, Mistake, STEPS_DEG, session};

@@ -3,12 +3,12 @@
 use abbe::identify::results::TraceVerdict;
 use std::sync::Arc;
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::IdentifyError;
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::plausibility::{ConflictKind, SuggestionKind};
 use abbe::identify::results::FitResult;
 use abbe::identify::trace::{TraceOptions, trace};
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 use test_needs::data;
 

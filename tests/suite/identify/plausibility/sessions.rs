@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use abbe::model::files::{self, ReadOptions};
+use abbe::files::{self, ReadOptions};
 use abbe::model::session::Session;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;

@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::results::{EffectResult, TraceResult};
 use abbe::identify::trace::{TraceOptions, trace};
-use abbe::model::files::{self, ReadOptions};
 use serde_json::Value;
 
 fn traced(name: &str) -> (TraceResult, Value) {

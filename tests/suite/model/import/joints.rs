@@ -1,8 +1,8 @@
 //! Joints by the names of the robot's own file, and rows without a coordinate.
 
+use abbe::files::{self, ReadOptions};
 use abbe::identify::start::with_targets;
 use abbe::model::chain::{AxisPosition, BodyErrors};
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::frames::Point;
 use std::sync::Arc;
 

@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use abbe::model::files::{self, ReadOptions};
+use abbe::files::{self, ReadOptions};
 use abbe::model::instrument::Station;
 use abbe::model::session::Session;
 use abbe::model::session::readings::Readings;

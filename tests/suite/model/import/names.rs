@@ -1,6 +1,6 @@
 //! Names: of the files that are written, of the keys that are set.
 
-use abbe::model::files::{self, ReadOptions};
+use abbe::files::{self, ReadOptions};
 
 use super::{abbe, difference, foreign, import, message, text};
 

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use abbe::files::{self, Changes, ReadOptions, with_readings};
 use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulation, simulate};
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::{AxisPosition, Machine};
-use abbe::model::files::{self, Changes, ReadOptions, with_readings};
 use abbe::model::frames::Point;
 use nalgebra::{Matrix4, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};

@@ -6,9 +6,9 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use abbe::files::{self, ReadOptions};
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::{AxisPosition, BodyErrors, Machine};
-use abbe::model::files::{self, ReadOptions};
 use abbe::model::frames::Point;
 use nalgebra::{Matrix4, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};

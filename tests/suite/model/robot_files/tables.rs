@@ -56,7 +56,7 @@ fn limits_are_kept_or_named() {
     ] {
         assert!(said.contains(expected), "{expected}: {said}");
     }
-    let machine = abbe::model::files::machine(&folder.join("machine.toml")).unwrap();
+    let machine = abbe::files::machine(&folder.join("machine.toml")).unwrap();
     let travels: Vec<Option<[f64; 2]>> = machine.axes.iter().map(|axis| axis.travel).collect();
     assert_eq!(travels[1..], [None, None, Some([0.0, 180.0])]);
     assert!((travels[0].unwrap()[1] - 2.5).abs() < 1e-12);

@@ -1,0 +1,36 @@
+//! Set-ups shared by tests.
+
+use abbe_model::instrument::{InstrumentKind, SharedBy};
+use abbe_model::session::{Prior, Test};
+
+/// Warnings about a test that shares a mounted object with an earlier one and describes it differently.
+pub(crate) fn differing(earlier: &[Test], test: &Test) -> Vec<String> {
+    let unknowns = test.station.kind().unknowns();
+    let mut warnings = Vec::new();
+    for group in mounted_groups(test.station.kind()) {
+        let Some(first) = earlier.iter().find(|other| other.group(group) == test.group(group)) else {
+            continue;
+        };
+        let own = |test: &Test| -> (Vec<Prior>, [f64; 3]) {
+            let priors = unknowns.iter().zip(&test.priors);
+            let priors = priors.filter(|(unknown, _)| unknown.shared_by == group);
+            (priors.map(|(_, prior)| *prior).collect(), test.station.shared_mm(group))
+        };
+        if own(first) != own(test) {
+            warnings.push(format!(
+                "tests \"{}\" and \"{}\" share the set-up \"{}\" and describe it differently; an object that is mounted \
+                 once has one position",
+                first.name,
+                test.name,
+                test.group(group)
+            ));
+        }
+    }
+    warnings
+}
+
+/// The groups of an instrument's parameters that belong to objects that a user mounts.
+fn mounted_groups(kind: InstrumentKind) -> Vec<SharedBy> {
+    let groups = [SharedBy::Setup, SharedBy::SpindleSetup, SharedBy::BarSetup];
+    groups.into_iter().filter(|group| kind.shares(*group)).collect()
+}

@@ -1,0 +1,253 @@
+//! How a session reads a foreign table: as it is, or as a table with our columns where it cannot state the layout.
+
+use std::collections::BTreeMap;
+
+use abbe_model::document::layout::{Columns, ForeignColumn, Format};
+use abbe_model::document::node::Named;
+use abbe_model::document::value::Count;
+use abbe_model::driver::column as driver;
+use abbe_model::instrument::Fault;
+
+use super::grid::{Grid, number};
+use super::meaning::{ColumnFound, Found, Meaning};
+use super::open_units::{self, open};
+use super::unit::Unit;
+use super::values::Values;
+use super::words::Direction;
+use super::{Expected, Reading, Source};
+use crate::quantity;
+
+/// The ways to read a table, the most probable first. `name` is that of the file, for the head of a copy.
+///
+/// # Errors
+/// If numbers are missing or contradict their column, or a unit cannot be told.
+pub(super) fn readings(
+    name: &str,
+    grid: &Grid,
+    found: &[Found],
+    expected: &Expected<'_>,
+) -> Result<Vec<Reading>, Fault> {
+    let values = Values::of(grid, found, expected)?;
+    let mut choices: Vec<(Vec<String>, BTreeMap<usize, Unit>)> = vec![(Vec::new(), BTreeMap::new())];
+    for options in open(grid, found, expected, &values)? {
+        let before = std::mem::take(&mut choices);
+        for (text, units) in options {
+            for (texts, chosen) in &before {
+                let mut texts = texts.clone();
+                texts.push(text.clone());
+                choices.push((texts, chosen.iter().chain(&units).map(|(column, unit)| (*column, *unit)).collect()));
+            }
+        }
+    }
+    Ok(choices
+        .into_iter()
+        .map(|(assumes, units)| reading(name, grid, found, expected, &values, assumes, &units))
+        .collect())
+}
+
+/// The table in one way.
+fn reading(
+    name: &str,
+    grid: &Grid,
+    found: &[Found],
+    expected: &Expected<'_>,
+    values: &Values,
+    assumes: Vec<String>,
+    chosen: &BTreeMap<usize, Unit>,
+) -> Reading {
+    let unit = |one: &Found| {
+        let stated = one.unit.filter(|unit| !unit.is_ambiguous() && !matches!(one.meaning, Meaning::Driver(_)));
+        let unit = stated.or(chosen.get(&one.column).copied()).unwrap_or(Unit::of_own("1"));
+        if one.is_from_zenith { unit.above_horizon() } else { unit }
+    };
+    let columns: Vec<ColumnFound> = (0..grid.width())
+        .map(|column| {
+            let one = found.iter().find(|one| one.column == column);
+            ColumnFound {
+                number: column + 1,
+                name: grid.names[column].join(" "),
+                own: one.map(|one| own_name(one, unit(one), expected)),
+                unit_is_stated: one.is_some_and(|one| !chosen.contains_key(&one.column)),
+                direction: one.and_then(|one| one.direction).map(|direction| match direction {
+                    Direction::Forward => "forward",
+                    Direction::Backward => "backward",
+                }),
+            }
+        })
+        .collect();
+    let mut because = values.unreadable.clone();
+    because.extend(found.iter().filter_map(|one| {
+        let theirs = grid.name(one.column);
+        match one.meaning {
+            Meaning::Polar => Some(format!("`{theirs}` is a polar angle in place of positions")),
+            Meaning::Clock => Some(format!("`{theirs}` is a time of day")),
+            _ if !unit(one).is_own() => Some(format!("`{theirs}` has a unit that is converted")),
+            _ => None,
+        }
+    }));
+    if found.iter().any(|one| one.direction.is_some()) {
+        because.push("forward and backward stand in columns of their own".into());
+    }
+    let unused: Vec<String> =
+        columns.iter().filter(|column| column.own.is_none()).map(|column| grid.name(column.number - 1)).collect();
+    let mut remarks = assumes.clone();
+    if !unused.is_empty() {
+        remarks.push(format!("not read: {}", unused.join(", ")));
+    }
+    let source = if because.is_empty() {
+        as_it_is(grid, &columns)
+    } else {
+        Source::Normalised { csv: normalised(name, grid, found, expected, values, &unit, &because), because }
+    };
+    Reading { assumes, columns, source, remarks }
+}
+
+/// Our name of a column, with its unit.
+fn own_name(one: &Found, unit: Unit, expected: &Expected<'_>) -> String {
+    match &one.meaning {
+        Meaning::Axis(axis) => axis_name(*axis, unit.own, expected),
+        Meaning::Socket | Meaning::Run | Meaning::Temperature | Meaning::Driver(_) => one.meaning.stem().to_string(),
+        Meaning::Time | Meaning::Clock => "time_s".into(),
+        meaning if open_units::has_no_unit(meaning, expected) => meaning.stem().to_string(),
+        meaning => format!("{}_{}", meaning.stem(), unit.own),
+    }
+}
+
+fn axis_name(axis: usize, unit: &str, expected: &Expected<'_>) -> String {
+    let name = &expected.machine.axes[axis].name;
+    let lower = name.to_lowercase();
+    let own = if quantity::axis_index(expected.machine, &lower) == Some(axis) { &lower } else { name };
+    format!("{own}_{unit}")
+}
+
+/// `[format]` and `[columns]` of a table that a reader of tables accepts.
+fn as_it_is(grid: &Grid, columns: &[ColumnFound]) -> Source {
+    let text = |text: char| text.to_string();
+    let format = Format {
+        separator: grid.separator.filter(|separator| *separator != ',').map(text),
+        decimal: Some(grid.decimal).filter(|decimal| *decimal != '.').map(text),
+        header: grid.header_line.is_none().then_some(false),
+        encoding: (grid.encoding != "utf-8").then(|| grid.encoding.to_string()),
+        skip_lines: Some(Count(grid.skipped_lines())).filter(|lines| lines.0 > 0),
+        ..Format::default()
+    };
+    let mut own: Vec<(String, ForeignColumn)> = Vec::new();
+    let mut drivers: Vec<(String, ForeignColumn)> = Vec::new();
+    for column in columns {
+        let Some(name) = &column.own else { continue };
+        let foreign = match grid.header_line {
+            Some(_) => ForeignColumn::Name(column.name.clone()),
+            None => ForeignColumn::Number(Count(column.number)),
+        };
+        match name.strip_prefix(driver::PREFIX) {
+            Some(name) => drivers.push((name.to_string(), foreign)),
+            None => own.push((name.clone(), foreign)),
+        }
+    }
+    Source::AsItIs { format, columns: Columns { driver: Named(drivers), own: Named(own) } }
+}
+
+/// A column of the table that is written: its name, and the cell of a row of the grid in a direction.
+struct Written<'w> {
+    name: String,
+    cell: Box<dyn Fn(usize, Option<Direction>) -> String + 'w>,
+}
+
+/// The table with our columns.
+fn normalised(
+    name: &str,
+    grid: &Grid,
+    found: &[Found],
+    expected: &Expected<'_>,
+    values: &Values,
+    unit: &dyn Fn(&Found) -> Unit,
+    because: &[String],
+) -> String {
+    let directed = found.iter().any(|one| one.direction.is_some());
+    let value = |one: &Found, row: usize| unit(one).converted(values.by_column[&one.column][row]);
+    // Of the columns of one meaning, that of a direction.
+    let of = |meaning: &Meaning, direction: Option<Direction>| {
+        let of_meaning = || found.iter().filter(move |one| one.meaning == *meaning);
+        let own = of_meaning().find(|one| one.direction == direction);
+        own.or_else(|| of_meaning().find(|one| one.direction.is_none())).or_else(|| of_meaning().next())
+    };
+    let in_rad = |one: &Found, row: usize| {
+        let own = unit(one);
+        quantity::Unit::of_column(own.own, true).map_or(f64::NAN, |to| to.to_internal(value(one, row)))
+    };
+    let mut written: Vec<Written<'_>> = Vec::new();
+    let mut seen: Vec<&Meaning> = Vec::new();
+    for one in found {
+        if seen.contains(&&one.meaning)
+            || directed && matches!(one.meaning, Meaning::Time | Meaning::Clock | Meaning::Run)
+        {
+            continue;
+        }
+        seen.push(&one.meaning);
+        match &one.meaning {
+            Meaning::Polar => {
+                let Some(circle) = expected.circle else { continue };
+                for (place, axis) in circle.axes.into_iter().enumerate() {
+                    let part = move |angle: f64| if place == 0 { angle.cos() } else { angle.sin() };
+                    let cell = move |row: usize, _: Option<Direction>| {
+                        decimal(circle.centre_mm[place] + circle.amplitude_mm[place] * part(in_rad(one, row)))
+                    };
+                    written.push(Written { name: axis_name(axis, "mm", expected), cell: Box::new(cell) });
+                }
+            }
+            meaning => {
+                let cell = move |row: usize, direction: Option<Direction>| {
+                    let Some(one) = of(meaning, direction) else { return String::new() };
+                    let text = &grid.rows[values.rows[row]].cells[one.column];
+                    let Some(numbers) = values.by_column.get(&one.column) else { return quoted(text) };
+                    match unit(one).is_own() && *meaning != Meaning::Clock {
+                        _ if numbers[row].is_nan() => String::new(),
+                        true if grid.decimal == '.' && number(text, '.').is_some() && text.is_ascii() => text.clone(),
+                        _ => decimal(value(one, row)),
+                    }
+                };
+                written.push(Written { name: own_name(one, unit(one), expected), cell: Box::new(cell) });
+            }
+        }
+    }
+    let of_run = |row: usize| found.iter().find(|one| one.meaning == Meaning::Run).map_or(1.0, |one| value(one, row));
+    let mut order: Vec<(usize, Option<Direction>, Option<usize>)> = Vec::new();
+    if directed {
+        let mut runs: Vec<f64> = Vec::new();
+        (0..values.rows.len()).map(of_run).for_each(|run| {
+            if !runs.contains(&run) {
+                runs.push(run);
+            }
+        });
+        for (place, run) in runs.iter().enumerate() {
+            let rows: Vec<usize> = (0..values.rows.len()).filter(|row| of_run(*row) == *run).collect();
+            order.extend(rows.iter().map(|row| (*row, Some(Direction::Forward), Some(2 * place + 1))));
+            order.extend(rows.iter().rev().map(|row| (*row, Some(Direction::Backward), Some(2 * place + 2))));
+        }
+    } else {
+        order.extend((0..values.rows.len()).map(|row| (row, None, None)));
+    }
+    let mut text = format!("# From {}: {}.\n", name.replace(['\n', '\r'], " "), because.join("; "));
+    let header: Vec<&str> =
+        directed.then_some("run").into_iter().chain(written.iter().map(|column| column.name.as_str())).collect();
+    text += &header.join(",");
+    text.push('\n');
+    for (row, direction, run) in order {
+        let cells = run
+            .map(|run| run.to_string())
+            .into_iter()
+            .chain(written.iter().map(|column| (column.cell)(row, direction)));
+        text += &cells.collect::<Vec<_>>().join(",");
+        text.push('\n');
+    }
+    text
+}
+
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '#']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_string() }
+}
+
+/// A number with the digits that it has.
+fn decimal(value: f64) -> String {
+    if value.is_nan() { String::new() } else { value.to_string() }
+}

@@ -1,0 +1,82 @@
+//! What a data format is: the one trait that every format implements.
+//!
+//! A format is one file beside this one and one line in [`formats`](super::formats).
+
+use std::io::Read;
+use std::path::Path;
+
+use abbe_model::error::ModelError;
+use abbe_model::session::readings::Readings;
+
+use super::request::Request;
+use super::row::Row;
+use crate::stamp::FileStamp;
+use crate::store::Store;
+
+/// A format of data files.
+pub(super) trait DataFormat: Sync {
+    /// Whether the format reads this file: by its extension or its first bytes.
+    fn reads(&self, file: &Path, store: &Store) -> bool;
+
+    /// Opens the file and returns its rows, or its readings if they are more than a table.
+    ///
+    /// # Errors
+    /// If the file cannot be opened or is not of this format, with its location and what to do.
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, ModelError>;
+}
+
+/// The content of a data file.
+pub(super) enum Content {
+    /// Rows of cells, which become readings by the roles of their columns.
+    Table(Table),
+    /// Readings that the format itself interprets.
+    Readings(Box<WholeReadings>),
+}
+
+/// Rows of cells.
+pub(super) struct Table {
+    /// The state of the file.
+    pub stamp: FileStamp,
+    /// Whether the first row names the columns.
+    pub has_header: bool,
+    /// The rows.
+    pub rows: Box<dyn Rows>,
+}
+
+/// The rows of a file, one after another. All have the same number of cells.
+pub(super) trait Rows {
+    /// The next row, or `None` at the end.
+    ///
+    /// # Errors
+    /// If the next line is not a row of the format, or beyond a limit.
+    fn next_row(&mut self) -> Result<Option<Row>, ModelError>;
+
+    /// Takes a row that is no longer needed, so that the next one can use its memory: a file has millions of them.
+    fn reuse(&mut self, _: Row) {}
+}
+
+/// Readings with all their columns.
+pub(super) struct WholeReadings {
+    /// The state of the file.
+    pub stamp: FileStamp,
+    /// The readings.
+    pub readings: Readings,
+    /// Warnings about the file, complete with its name.
+    pub warnings: Vec<String>,
+}
+
+/// Whether the name of a file ends in one of these extensions, in any case.
+pub(super) fn has_extension(file: &Path, known: &[&str]) -> bool {
+    let extension = file.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+    extension.is_some_and(|extension| known.contains(&extension.as_str()))
+}
+
+/// Bytes at the start of a file from which a format is recognised.
+const START_BYTES: u64 = 1024;
+
+/// Whether a file that can be read starts as `expected` says.
+pub(super) fn starts_with(file: &Path, store: &Store, expected: impl Fn(&str) -> bool) -> bool {
+    let mut start = Vec::new();
+    let read = store.open(file).and_then(|opened| opened.take(START_BYTES).read_to_end(&mut start));
+    read.is_ok() && expected(&String::from_utf8_lossy(&start))
+}

@@ -1,0 +1,250 @@
+//! Spreadsheets (XLSX, XLS, ODS) as rows of cells, read by calamine.
+//!
+//! The first row that is not empty is the header; a row whose first cell begins with `#` is a comment. The display
+//! format of a cell is ignored: a number is read with all its digits, a formula by its last value.
+
+use std::io::{Cursor, Read};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+use abbe_model::error::{Location, ModelError};
+use calamine::{Data, Error, Ods, Reader, Sheets, Xls, Xlsb, Xlsx, XlsxError, open_workbook_from_rs};
+use zip::ZipArchive;
+
+use super::format::{Content, DataFormat, Rows, Table, has_extension};
+use super::request::{Format, Request};
+use super::row::Row;
+use crate::stamp::FileStamp;
+use crate::store::Store;
+
+/// The format, recognised by the extension of the file.
+pub(super) struct Spreadsheet;
+
+impl DataFormat for Spreadsheet {
+    fn reads(&self, file: &Path, _: &Store) -> bool {
+        has_extension(file, &["xlsx", "xlsm", "xlsb", "xls", "ods"])
+    }
+
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, ModelError> {
+        let (stamp, rows) = rows(request.store, file, &request.format)?;
+        Ok(Content::Table(Table {
+            stamp,
+            has_header: request.format.header,
+            rows: Box::new(SheetRows(rows.into_iter())),
+        }))
+    }
+}
+
+/// The rows of a sheet that was read as a whole.
+struct SheetRows(std::vec::IntoIter<Row>);
+
+impl Rows for SheetRows {
+    fn next_row(&mut self) -> Result<Option<Row>, ModelError> {
+        Ok(self.0.next())
+    }
+}
+
+/// Largest size of a spreadsheet, bytes.
+const MAX_BYTES: u64 = 64 << 20;
+/// Largest unpacked size, bytes; the content is held in memory.
+const MAX_UNPACKED: u64 = 256 << 20;
+/// Largest number of columns.
+const MAX_COLUMNS: u32 = 1000;
+/// Largest number of cells of the rectangle around all filled cells.
+const MAX_CELLS: usize = 20_000_000;
+
+/// The rows of a sheet, and the state of the file.
+fn rows(store: &Store, file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>), ModelError> {
+    let fault =
+        |message: String, help: String| ModelError::Input { location: Location::file(file), message, help: Some(help) };
+    let broken = |cause: Error| {
+        fault(
+            format!("the spreadsheet cannot be read: {cause}"),
+            "check that it opens in a spreadsheet program, or export it as CSV".into(),
+        )
+    };
+    let found = store.state(file).map_err(|cause| broken(cause.into()))?;
+    if !found.regular {
+        return Err(broken(std::io::Error::other("it is not a file").into()));
+    }
+    if found.bytes > MAX_BYTES {
+        return Err(fault(
+            format!("a spreadsheet of {} bytes; the limit is {MAX_BYTES}", found.bytes),
+            "export it as CSV".into(),
+        ));
+    }
+    let mut contents = Vec::new();
+    let mut opened = store.open(file).map_err(|cause| broken(cause.into()))?;
+    opened.by_ref().take(MAX_BYTES + 1).read_to_end(&mut contents).map_err(|cause| broken(cause.into()))?;
+    let stamp = FileStamp::of(file, found);
+    stamp.finish(&opened)?;
+    if unpacks_beyond(&contents, MAX_UNPACKED) {
+        return Err(fault(
+            format!("a spreadsheet that unpacks to more than {MAX_UNPACKED} bytes, which is the limit"),
+            "export it as CSV".into(),
+        ));
+    }
+    let mut book = catch_panic(|| workbook(file, contents)).map_err(broken)?;
+    let names = book.sheet_names();
+    let sheets_to_read: Vec<String> = match &format.sheet {
+        Some(name) if names.contains(name) => vec![name.clone()],
+        Some(name) => {
+            return Err(fault(format!("there is no sheet `{name}`"), format!("it has {}", names.join(", "))));
+        }
+        None => names.clone(),
+    };
+    let mut filled: Vec<(String, Vec<Row>)> = Vec::new();
+    for name in sheets_to_read {
+        let cells = catch_panic(|| cells(&mut book, &name)).map_err(broken)?;
+        let rows = by_row(cells, format).map_err(|(message, help)| fault(message, help))?;
+        if !rows.is_empty() {
+            filled.push((name, rows));
+        }
+    }
+    match filled.len() {
+        0 | 1 => Ok((stamp, filled.pop().map(|(_, rows)| rows).unwrap_or_default())),
+        _ => {
+            let names: Vec<&str> = filled.iter().map(|(name, _)| name.as_str()).collect();
+            Err(fault(
+                format!("several sheets contain cells: {}", names.join(", ")),
+                format!("select one: `[format] sheet = \"{}\"`", names[0]),
+            ))
+        }
+    }
+}
+
+/// A spreadsheet in memory.
+type Book = Sheets<Cursor<Vec<u8>>>;
+
+/// The spreadsheet of a file, in the format that its extension states.
+fn workbook(file: &Path, contents: Vec<u8>) -> Result<Book, Error> {
+    let contents = Cursor::new(contents);
+    Ok(if has_extension(file, &["xls"]) {
+        Sheets::Xls(open_workbook_from_rs::<Xls<_>, _>(contents)?)
+    } else if has_extension(file, &["xlsb"]) {
+        Sheets::Xlsb(open_workbook_from_rs::<Xlsb<_>, _>(contents)?)
+    } else if has_extension(file, &["ods"]) {
+        Sheets::Ods(open_workbook_from_rs::<Ods<_>, _>(contents)?)
+    } else {
+        Sheets::Xlsx(open_workbook_from_rs::<Xlsx<_>, _>(contents)?)
+    })
+}
+
+/// Whether the parts of a ZIP file unpack to more than this number of bytes. The sizes stated in the file are not
+/// trusted.
+fn unpacks_beyond(contents: &[u8], most: u64) -> bool {
+    // A file that is not ZIP is not packed.
+    let Ok(mut archive) = ZipArchive::new(Cursor::new(contents)) else { return false };
+    let mut left = most;
+    for part in 0..archive.len() {
+        let Ok(part) = archive.by_index(part) else {
+            continue;
+        };
+        let read = std::io::copy(&mut part.take(left + 1), &mut std::io::sink()).unwrap_or(0);
+        if read > left {
+            return true;
+        }
+        left -= read;
+    }
+    false
+}
+
+/// Calls the library. It may panic on a contradictory file (a row number beyond 32 bits, in builds with overflow
+/// checks); the panic becomes an ordinary error.
+fn catch_panic<T>(read: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
+    let contradicts = || std::io::Error::other("its content is contradictory").into();
+    catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_| Err(contradicts()))
+}
+
+/// A cell with its row and column, from 0.
+type PlacedCell = (u32, u32, Data);
+
+/// The filled cells of a sheet.
+///
+/// Cells that the file lists one by one are read one by one: the rectangle around two cells in opposite corners would
+/// not fit in memory.
+fn cells(book: &mut Book, name: &str) -> Result<Vec<PlacedCell>, Error> {
+    let mut cells = Vec::new();
+    match book {
+        Sheets::Xlsx(book) => {
+            let mut reader = match book.worksheet_cells_reader(name) {
+                Err(XlsxError::NotAWorksheet(_)) => return Ok(cells),
+                reader => reader?,
+            };
+            while let Some(cell) = reader.next_cell()? {
+                let (row, column) = cell.get_position();
+                cells.push((row, column, Data::from(cell.get_value().clone())));
+            }
+        }
+        Sheets::Xlsb(book) => {
+            let mut reader = book.worksheet_cells_reader(name)?;
+            while let Some(cell) = reader.next_cell()? {
+                let (row, column) = cell.get_position();
+                cells.push((row, column, Data::from(cell.get_value().clone())));
+            }
+        }
+        book => {
+            let range = book.worksheet_range(name)?;
+            let (top, left) = range.start().unwrap_or_default();
+            let used = range.used_cells();
+            cells.extend(used.map(|(row, column, cell)| (top + row as u32, left + column as u32, cell.clone())));
+        }
+    }
+    cells.retain(|(_, _, cell)| *cell != Data::Empty);
+    Ok(cells)
+}
+
+/// Cells as rows of equal width, without comments and empty rows. If they are too far apart: a message and what to do.
+fn by_row(mut cells: Vec<PlacedCell>, format: &Format) -> Result<Vec<Row>, (String, String)> {
+    cells.retain(|(row, ..)| *row as usize >= format.skip_lines);
+    let columns = || cells.iter().map(|(_, column, _)| *column);
+    let (Some(left), Some(right)) = (columns().min(), columns().max()) else {
+        return Ok(Vec::new());
+    };
+    let help = "remove the cells beside the table, or export it as CSV";
+    if right - left >= MAX_COLUMNS {
+        let message = format!(
+            "cells from column {} to column {}; the limit is {MAX_COLUMNS} columns",
+            left + 1,
+            u64::from(right) + 1
+        );
+        return Err((message, help.into()));
+    }
+    let width = (right - left) as usize + 1;
+    // If two cells have the same position, the later one is used.
+    cells.sort_by_key(|(row, column, _)| (*row, *column));
+    let mut rows: Vec<Row> = Vec::new();
+    for of_row in cells.chunk_by(|(row, ..), (next, ..)| row == next) {
+        let first = of_row.iter().find(|(_, column, _)| *column == left);
+        if matches!(first, Some((_, _, Data::String(text))) if text.trim_start().starts_with('#')) {
+            continue;
+        }
+        if (rows.len() + 1) * width > MAX_CELLS {
+            let message = format!("more than {MAX_CELLS} cells in the rectangle around all filled cells");
+            return Err((message, help.into()));
+        }
+        let mut texts = vec![String::new(); width];
+        for (_, column, cell) in of_row {
+            texts[(column - left) as usize] = text(cell, format);
+        }
+        rows.push(Row::of_cells(of_row[0].0 as usize + 1, texts));
+    }
+    Ok(rows)
+}
+
+/// The text of a cell in a CSV file of this format.
+fn text(cell: &Data, format: &Format) -> String {
+    let number = |text: String| {
+        if format.decimal == b',' { text.replace('.', ",") } else { text }
+    };
+    match cell {
+        Data::Empty => String::new(),
+        Data::String(text) => text.trim().to_string(),
+        Data::Int(value) => value.to_string(),
+        Data::Float(value) => number(value.to_string()),
+        Data::Bool(truth) => truth.to_string(),
+        Data::DateTime(_) => "a date".into(),
+        Data::DateTimeIso(text) | Data::DurationIso(text) => text.clone(),
+        Data::Error(error) => format!("the error {error}"),
+    }
+}
