@@ -7,7 +7,7 @@ use std::path::Path;
 use sha2::{Digest, Sha256};
 
 /// Folders with everything in them that determines the result of a session, besides the dependencies.
-const SOURCES: [&str; 4] = ["files/src", "identify/src", "model/src", "src/fleet"];
+const SOURCES: [&str; 5] = ["files/src", "identify/src", "model/src", "src/fleet", "trace/src"];
 
 /// Digits of the checksum that are stated.
 const DIGITS: usize = 12;

@@ -2,10 +2,10 @@
 
 use std::hint::black_box;
 
-use abbe::identify::SessionFit;
 use abbe::identify::noise::{Noise, NoiseSource};
 use abbe::identify::problem::Problem;
 use abbe::prelude::*;
+use abbe::trace::SessionFit;
 use rayon::prelude::*;
 
 /// Mean processor time of a repeated computation, s. Other work on the machine does not count.

@@ -16,7 +16,7 @@ import subprocess
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-BENCHES = [("abbe-model", "chain"), ("abbe-identify", "fit"), ("abbe-codegen", "kernel")]
+BENCHES = [("abbe-model", "chain"), ("abbe-identify", "fit"), ("abbe-trace", "trace"), ("abbe-codegen", "kernel")]
 CACHE, STREAM = "value and eight derivatives, in cache", "value and eight derivatives, streaming"
 ALL = "value and all components of a five-axis machine/37 components"
 MONTE_CARLO = "Monte Carlo"

@@ -6,7 +6,7 @@ cd "$(dirname "$0")/.."
 list=snapshots/public-items.txt
 found="$(mktemp)"
 trap 'rm -f "$found"' EXIT
-for crate in abbe abbe_apply abbe_codegen abbe_files abbe_identify abbe_model abbe_plan; do
+for crate in abbe abbe_apply abbe_codegen abbe_files abbe_identify abbe_model abbe_plan abbe_trace; do
     grep -o '<li><a href="[^"]*">' "${CARGO_TARGET_DIR:-target}/doc/$crate/all.html" |
         sed -E "s|<li><a href=\"(.*)\">|\1|; s|^(.*/)?([a-z]+)\.([A-Za-z0-9_]+)\.html|\1\3 \2|; s|/|::|g; s|^|$crate::|"
 done | LC_ALL=C sort >"$found"

@@ -1,13 +1,14 @@
 //! Abbe: a modelling workspace for the geometric errors of machine tools and other serial chains.
 //!
-//! The facade of six crates. The command `abbe` is built on the same.
+//! The facade of seven crates. The command `abbe` is built on the same.
 //!
 //! | for | look in |
 //! |---|---|
 //! | a program that fits, traces, simulates or prints an equation | [`prelude`] |
 //! | the machine, instruments, effects, sessions | [`model`] |
 //! | their files: machines, sessions, tables of readings, robots | [`files`] |
-//! | estimates, uncertainty, the trace of unmodelled effects | [`identify`] |
+//! | estimates, uncertainty, saved models | [`identify`] |
+//! | the trace of unmodelled effects, the validation of a model | [`trace`] |
 //! | what a set of readings would say: identifiability, next test, poses | [`plan`] |
 //! | what follows from an identified model: correction, export, comparison, history | [`apply`] |
 //! | closed forms and their languages | [`codegen`] |
@@ -56,6 +57,7 @@ pub use abbe_files as files;
 pub use abbe_identify as identify;
 pub use abbe_model as model;
 pub use abbe_plan as plan;
+pub use abbe_trace as trace;
 
 pub mod certificate;
 pub mod document;
@@ -81,17 +83,17 @@ pub mod prelude {
     pub use abbe_codegen::{Equation, Options as EquationOptions, Order, SessionTest, check, language};
     pub use abbe_files::read::add_node;
     pub use abbe_files::table::memory::MemoryColumn;
-    pub use abbe_identify::SessionFit;
     pub use abbe_identify::quantity::Given;
     pub use abbe_identify::results::{FitResult, ParameterResult, TraceResult};
     pub use abbe_identify::simulate::{Simulated, Simulation, simulate};
-    pub use abbe_identify::trace::{Progress, TraceOptions, TraceOutcome, trace};
     pub use abbe_model::chain::Machine;
     pub use abbe_model::component::ErrorName;
     pub use abbe_model::error::ModelError;
     pub use abbe_model::instrument::InstrumentKind;
     pub use abbe_model::session::Session;
     pub use abbe_plan::{PlanOptions, analyse};
+    pub use abbe_trace::SessionFit;
+    pub use abbe_trace::{Progress, TraceOptions, TraceOutcome, trace};
 
     /// Reads a session file and the machine and data that it names.
     ///

@@ -82,7 +82,7 @@ def crates():
 
 def families():
     """The families of the library of the search, and the effects that show them, from the comments behind their names."""
-    library = ROOT / "identify" / "src" / "candidates" / "library" / "library.toml"
+    library = ROOT / "trace" / "src" / "candidates" / "library" / "library.toml"
     found = re.findall(r'^name = "(.+)" # shown as (.+)$', library.read_text(encoding="utf-8"), re.MULTILINE)
     return [[family, ", ".join(f"`{effect}`" for effect in effects.split(", "))] for family, effects in found]
 

@@ -132,9 +132,10 @@ def exclude_mutants_that_do_not_build(copy, originals, mutants, packages):
 
 # Folders whose tests cover a package, its own first.
 TESTED_BY = {
-    "abbe-model": ("model", "files", "codegen", "identify", "plan", "apply", "."),
-    "abbe-files": ("files", "identify", "plan", "apply", "."),
-    "abbe-identify": ("identify", "plan", "apply", "."),
+    "abbe-model": ("model", "files", "codegen", "identify", "trace", "plan", "apply", "."),
+    "abbe-files": ("files", "identify", "trace", "plan", "apply", "."),
+    "abbe-identify": ("identify", "trace", "plan", "apply", "."),
+    "abbe-trace": ("trace", "plan", "apply", "."),
     "abbe-plan": ("plan", "."),
     "abbe-apply": ("apply", "."),
     "abbe-codegen": ("codegen", "."),

@@ -1,6 +1,5 @@
 //! Measures the duration of a fit with a thousand to a million readings: four ball-bar tests, eight errors and 28
-//! set-up parameters with priors. Measures a trace of the tests of chapter 5, and a thousand Monte Carlo draws of their
-//! fit.
+//! set-up parameters with priors. Measures a thousand Monte Carlo draws of the fit of the tests of chapter 5.
 //!
 //! `cargo bench -p abbe-identify --bench fit`. `identify/benches/peers.py` measures the same with other tools.
 #![allow(missing_docs)]
@@ -11,7 +10,6 @@ use std::time::Duration;
 use abbe_identify::fit::{fit, prepare, report};
 use abbe_identify::monte_carlo::MonteCarlo;
 use abbe_identify::propagation::add_monte_carlo;
-use abbe_identify::trace::{TraceOptions, trace};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 
 mod sessions;
@@ -31,16 +29,6 @@ fn fits(criterion: &mut Criterion) {
             bencher.iter(|| black_box(prepare(black_box(&session), 1).expect("a fit")));
         });
     }
-    group.finish();
-}
-
-fn traces(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("trace");
-    group.sample_size(10).measurement_time(Duration::from_secs(20));
-    let session = sessions::chapter_5();
-    group.bench_function("chapter 5, nothing to find", |bencher| {
-        bencher.iter(|| black_box(trace(black_box(&session), &TraceOptions::default(), &|_| true).expect("a trace")));
-    });
     group.finish();
 }
 
@@ -64,5 +52,5 @@ fn monte_carlo(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, fits, traces, monte_carlo);
+criterion_group!(benches, fits, monte_carlo);
 criterion_main!(benches);

@@ -6,11 +6,10 @@
 //! step to the fit of the other folds is `W(I − TᵀT)⁻¹(y − Tᵀr)`, with a matrix no larger than the number of the fold's rows
 //! (Woodbury). If the other folds barely determine a direction, their triangular factors are merged and solved again.
 
-pub(crate) mod figures;
+mod figures;
 pub(crate) mod folds;
-pub(crate) mod joint_space;
-pub(crate) mod left_out_test;
-pub(crate) mod paired;
+mod joint_space;
+mod left_out_test;
 
 use faer::Mat;
 
@@ -21,8 +20,10 @@ use crate::numerics::symmetric::Symmetric;
 use crate::numerics::tolerances::MIN_UPDATE_SHARE;
 use crate::numerics::triangle::Triangle;
 use crate::problem::Problem;
-pub(crate) use folds::mislabelled_runs;
-pub use folds::{FoldKind, Folds};
+pub use figures::cross_validation;
+pub use folds::{FoldKind, Folds, mislabelled_runs};
+pub use joint_space::{coordinates, squared_distance};
+pub use left_out_test::{LeftOutTests, NotLeftOut, left_out_tests};
 
 /// Held-out residuals.
 #[derive(Clone, Debug)]
@@ -184,8 +185,9 @@ fn step_without(rest: &Triangle, beta: &[f64], basis: &Mat<f64>) -> Result<Vec<f
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use rand::{RngExt, SeedableRng};
+
+    use super::*;
 
     /// Simulated rows of `[J | r]`.
     fn simulated(rows: usize, parameters: usize, random: &mut rand_pcg::Pcg64Mcg) -> Triangle {

@@ -118,7 +118,7 @@ pub struct Parameters {
 const START_OF_SCALE: f64 = 0.01;
 
 /// The physical size of a delay, s.
-pub(crate) const LONG_DELAY_S: f64 = 0.1;
+pub const LONG_DELAY_S: f64 = 0.1;
 
 /// The physical size of a component.
 pub fn physical_size(unit: InternalUnit) -> f64 {

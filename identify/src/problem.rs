@@ -151,11 +151,12 @@ impl Problem {
         Ok(())
     }
 
-    /// Linearises the model in the estimated numbers of shapes ([`Parameters::linearise_numbers`]).
+    /// Adds the changes of estimated numbers of shapes in `beta` (internal units, one value per parameter) to the shapes,
+    /// sets them to zero, and linearises the model in these numbers at the coefficients in `beta`.
     ///
     /// # Errors
-    /// As there.
-    pub(crate) fn linearise_numbers(&mut self, beta: &mut [f64]) -> Result<(), IdentifyError> {
+    /// If the data lack the column of a driver.
+    pub fn linearise_numbers(&mut self, beta: &mut [f64]) -> Result<(), IdentifyError> {
         if self.parameters.has_numbers() {
             let (tests, models) = (&self.tests, &self.models);
             self.parameters.linearise_numbers(&self.session, tests, models, &self.reference, beta)?;
@@ -213,7 +214,7 @@ impl Problem {
     }
 
     /// Number of scalar readings of a test that are not excluded.
-    pub(crate) fn scalars_of(&self, test: usize) -> usize {
+    pub fn scalars_of(&self, test: usize) -> usize {
         let rows = self.rejected[test].iter().filter(|rejected| !**rejected).count();
         let missing = self.missing[test].iter().enumerate();
         let channels = self.channels(test);

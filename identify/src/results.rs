@@ -8,6 +8,7 @@ mod parameter;
 mod pointing;
 mod statements;
 mod trace;
+pub mod validation;
 
 use std::collections::BTreeMap;
 

@@ -21,6 +21,7 @@ use crate::linear::is_of_interest;
 use crate::parameters::Role;
 use crate::plausibility::Plausibility;
 use crate::problem::Problem;
+use crate::results::validation::{MovedParameter, ValidationResult, ValidationVerdict};
 use crate::results::{
     AxisCorrection, Covariance, DeterminedBy, FitResult, GoodStatement, Goodness, GoodnessVerdict, LineQuantity,
     MeasureStatement, NextStep, ParameterResult, Statements, TraceResult, ValidationStatement,
@@ -28,7 +29,6 @@ use crate::results::{
 use crate::tolerance::Conformity;
 use crate::tolerance::rule::Decision;
 use crate::unit::ARCSEC;
-use crate::validate::results::{MovedParameter, ValidationResult, ValidationVerdict};
 
 /// A component of a unit vector above which it is taken as along the axis.
 const ALONG: f64 = 0.9;

@@ -48,10 +48,9 @@ fn the_offset_of_an_axis_is_found_in_readings_in_memory() {
 
 /// Results outlive the session that was passed in, and cross threads.
 #[test]
-fn a_fit_and_a_trace_own_what_they_need() {
+fn a_fit_owns_what_it_needs() {
     fn owned<T: Send + Sync + 'static>() {}
     owned::<Session>();
     owned::<abbe_identify::problem::Problem>();
     owned::<fit::Fit>();
-    owned::<abbe_identify::trace::TraceOutcome>();
 }

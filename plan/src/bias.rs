@@ -13,8 +13,6 @@
 use std::collections::BTreeMap;
 
 use abbe_identify::IdentifyError;
-use abbe_identify::candidates::columns::Columns;
-use abbe_identify::candidates::library;
 use abbe_identify::linear::{Linearisation, is_of_interest};
 use abbe_identify::numerics::ranking::largest_first;
 use abbe_identify::problem::Problem;
@@ -22,6 +20,8 @@ use abbe_identify::unit::Unit;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::effect::shape::Harmonic;
 use abbe_model::effect::{Component, Effect, Shape};
+use abbe_trace::candidates::columns::Columns;
+use abbe_trace::candidates::library;
 use faer::Mat;
 use schemars::JsonSchema;
 use serde::Serialize;

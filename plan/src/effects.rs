@@ -18,8 +18,6 @@ use faer::{Mat, MatRef};
 use super::detectability::{POWER, SIGNIFICANCE, corrected};
 use super::results::{Bias, Detectability, EffectDetectability, EffectsAnalysis};
 use crate::PlanError;
-use abbe_identify::candidates::columns::{Columns, EffectColumns, chunked};
-use abbe_identify::candidates::library::{self, LibraryEffect};
 use abbe_identify::linear::{Linearisation, is_of_interest};
 use abbe_identify::numerics::parallel;
 use abbe_identify::numerics::power::noncentrality;
@@ -29,6 +27,8 @@ use abbe_identify::numerics::tolerances::ROUNDING_OF_SQUARES;
 use abbe_identify::parameters::physical_size;
 use abbe_identify::problem::Problem;
 use abbe_identify::unit::Unit;
+use abbe_trace::candidates::columns::{Columns, EffectColumns, chunked};
+use abbe_trace::candidates::library::{self, LibraryEffect};
 
 /// Share of the signal below which an effect counts as confounded.
 const CONFOUNDED_BELOW: f64 = 0.01;

@@ -13,9 +13,9 @@ use super::design::{Design, Goal, bound};
 use super::proposal::{self, proposal};
 use super::test_variations::TestVariations;
 use crate::PlanError;
-use abbe_identify::candidates::named;
 use abbe_identify::numerics::ranking::smallest_first;
 use abbe_identify::problem::Problem;
+use abbe_trace::candidates::named;
 
 /// Options of the selection of next tests.
 #[derive(Clone, Debug)]

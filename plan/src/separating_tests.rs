@@ -11,9 +11,9 @@ use crate::separate::{AlternativeSeparation, SeparatingTest, separating_tests};
 use crate::test_variations::TestVariations;
 use abbe_identify::parameters::Role;
 use abbe_identify::results::{AlternativeResult, EffectResult, SeparatingTestResult, SeparationResult};
-use abbe_identify::trace::interrupt::Interrupt;
-use abbe_identify::trace::result::effect_name;
-use abbe_identify::trace::{Progress, TraceOutcome};
+use abbe_trace::interrupt::Interrupt;
+use abbe_trace::result::effect_name;
+use abbe_trace::{Progress, TraceOutcome};
 
 /// Maximum number of aliases that are compared with an effect, the nearest first. Each alias adds columns.
 const MAX_COMPARED_TESTS: usize = 24;

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use abbe::document::{Call, Document, StatedFit};
-use abbe::identify::SessionFit;
 use abbe::identify::fit::Fit as Estimated;
 use abbe::identify::model_file::IdentifiedModel;
 use abbe::identify::problem::Problem;
@@ -11,6 +10,7 @@ use abbe::report::block::Report;
 use abbe::report::commands::Commands;
 use abbe::report::parameters::{self, Estimates};
 use abbe::report::{self, readings};
+use abbe::trace::SessionFit;
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 

@@ -12,12 +12,12 @@ use abbe::files::robot::dh::Convention;
 use abbe::identify::model_file::errors::EstimatedErrors;
 use abbe::identify::model_file::{self, IdentifiedModel};
 use abbe::identify::unit::ARCSEC;
-use abbe::identify::validate::{self, validate};
 use abbe::model::pose::Aim;
 use abbe::model::session::readings::Readings;
 use abbe::report::block::Report;
 use abbe::report::commands::Commands;
 use abbe::report::validate as present;
+use abbe::trace::validate::{self, validate};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 

@@ -4,12 +4,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use abbe::document::{Call, Document, StatedTrace};
-use abbe::identify::trace::{self, Progress, TraceOptions, TraceOutcome};
 use abbe::plan::separating_tests::separate_aliases;
 use abbe::plan::test_variations::TestVariations;
 use abbe::report::block::Report;
 use abbe::report::commands::Commands;
 use abbe::report::{self, readings};
+use abbe::trace::{self, Progress, TraceOptions, TraceOutcome};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use serde_json::{Map, Value};

@@ -1,7 +1,8 @@
 //! `abbe fit`: estimate errors from readings.
 
 use abbe::document::StatedFit;
-use abbe::identify::{SessionFit, fit, propagation};
+use abbe::identify::{fit, propagation};
+use abbe::trace::SessionFit;
 use clap::Args;
 
 use super::failure::Failure;

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use abbe::files::SourceMap;
 use abbe::identify::results::TraceResult;
-use abbe::identify::trace::TraceOutcome;
 use abbe::model::ModelError;
 use abbe::model::chain::Machine;
 use abbe::model::document::edit::SessionText;
 use abbe::model::document::print::Block;
 use abbe::model::document::test::Test;
+use abbe::trace::TraceOutcome;
 
 use super::failure::Failure;
 use super::message::{Kind, tell};

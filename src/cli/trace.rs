@@ -7,7 +7,7 @@ mod progress;
 use std::path::PathBuf;
 
 use abbe::document::StatedTrace;
-use abbe::identify::trace::TraceOptions;
+use abbe::trace::TraceOptions;
 use clap::Args;
 
 use clock::seconds;

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use abbe::document::StatedValidation;
 use abbe::files;
 use abbe::identify::model_file;
-use abbe::identify::validate::validate_anew;
 use abbe::model::component::ErrorName;
+use abbe::trace::validate::validate_anew;
 use clap::Args;
 
 use super::failure::Failure;

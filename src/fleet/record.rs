@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use abbe_identify::noise::NoiseSource;
+use abbe_identify::results::validation::ValidationVerdict;
 use abbe_identify::results::{
     Covariance, DeterminedBy, EffectName, GoodnessVerdict, ParameterResult, TraceVerdict, Unobservable,
 };
 use abbe_identify::tolerance::Conformity;
-use abbe_identify::validate::ValidationVerdict;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -10,12 +10,13 @@ use std::path::{Path, PathBuf};
 use abbe_files::stamp::FileStamp;
 use abbe_files::{ReadOptions, Source, SourceMap};
 use abbe_identify::IdentifyError;
+use abbe_identify::model_file;
 use abbe_identify::results::{FitResult, TraceResult};
-use abbe_identify::trace::{Progress, TraceOptions, trace};
-use abbe_identify::validate::validate;
-use abbe_identify::{SessionFit, model_file};
 use abbe_model::document::{of_domain, print};
 use abbe_model::session::Session;
+use abbe_trace::SessionFit;
+use abbe_trace::validate::validate;
+use abbe_trace::{Progress, TraceOptions, trace};
 use sha2::{Digest, Sha256};
 
 use super::options::Options;

@@ -1,9 +1,9 @@
 //! Effects that a trace has found, each beside its competing explanations.
 
 use abbe::identify::results::{AliasResult, EffectName, EffectResult, SeparatingTestResult, ShapeParameter};
-use abbe::identify::trace::TraceOutcome;
-use abbe::identify::trace::alias::CompetingEffect;
 use abbe::model::words::counted;
+use abbe::trace::TraceOutcome;
+use abbe::trace::alias::CompetingEffect;
 
 use super::block::{Level, Report, Text};
 use super::effect::name;

@@ -5,13 +5,13 @@ use abbe::apply::compare::results::Difference;
 use abbe::codegen::nc::has_letters;
 #[cfg(feature = "fleet")]
 use abbe::fleet::history::HistoryStatements;
+use abbe::identify::results::validation::MovedParameter;
+use abbe::identify::results::validation::ValidationVerdict;
 use abbe::identify::results::{
     AxisCorrection, DeterminedBy, GoodStatement, LineQuantity, MeasureStatement, NextStep, ParameterResult, Statements,
     ValidationStatement,
 };
 use abbe::identify::tolerance::rule::Decision;
-use abbe::identify::validate::ValidationVerdict;
-use abbe::identify::validate::results::MovedParameter;
 use abbe::model::chain::Machine;
 use abbe::model::session::Session;
 use abbe::model::words::{counted, first_of};

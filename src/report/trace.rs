@@ -5,8 +5,8 @@ use abbe::identify::IdentifyError;
 use abbe::identify::results::{EffectResult, GoodnessVerdict, ModelResult, PriorResult, TraceResult, TraceVerdict};
 use abbe::identify::series::{spectrum, views};
 use abbe::identify::statements::has_candidates;
-use abbe::identify::trace::TraceOutcome;
 use abbe::model::words::counted;
+use abbe::trace::TraceOutcome;
 
 use super::block::{KeyFigure, Level, Report, Sentence, Text};
 use super::commands::Commands;

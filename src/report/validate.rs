@@ -1,10 +1,11 @@
 //! A validated model: verdict, residuals of each machine, moved parameters, share of each effect.
 
 use abbe::document::StatedValidation;
-use abbe::identify::validate::results::RmsResult;
-use abbe::identify::validate::{Validation, ValidationResult, ValidationVerdict};
+use abbe::identify::results::validation::RmsResult;
+use abbe::identify::results::validation::{ValidationResult, ValidationVerdict};
 use abbe::model::session::Session;
 use abbe::model::words::counted;
+use abbe::trace::validate::Validation;
 
 use super::block::{KeyFigure, Report, Text};
 use super::commands::Commands;

@@ -1,6 +1,7 @@
 //! Figures of a validation: rms of each machine, residuals and coverage of each test, share of each effect.
 
-use abbe::identify::validate::{Validation, ValidationResult};
+use abbe::identify::results::validation::ValidationResult;
+use abbe::trace::validate::Validation;
 
 use crate::report::figure::bars::{Bars, Fill};
 use crate::report::figure::lines::{Axis, Lines, Mark, Series};

@@ -3,7 +3,7 @@
 
 use abbe::files::{ReadOptions, session};
 use abbe::identify::results::{EffectName, EffectResult};
-use abbe::identify::trace::{TraceOptions, trace};
+use abbe::trace::{TraceOptions, trace};
 use nalgebra::Vector3;
 use rand::RngExt;
 

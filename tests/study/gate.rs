@@ -2,12 +2,12 @@
 //! quoted.
 
 use abbe::files::{ReadOptions, session};
-use abbe::identify::SessionFit;
 use abbe::identify::results::TraceVerdict;
 use abbe::identify::tolerance::rule::Decision;
-use abbe::identify::trace::screening::screened_effects;
-use abbe::identify::trace::{TraceOptions, trace};
 use abbe::model::session::tolerance::{Limit, Tolerance, Toleranced};
+use abbe::trace::SessionFit;
+use abbe::trace::screening::screened_effects;
+use abbe::trace::{TraceOptions, trace};
 use rayon::prelude::*;
 
 use super::rates::Rate;

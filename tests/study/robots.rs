@@ -6,9 +6,9 @@ use std::path::Path;
 use abbe::files::{ReadOptions, session};
 use abbe::identify::model_file::{IdentifiedModel, Provenance};
 use abbe::identify::results::TraceVerdict;
-use abbe::identify::trace::{TraceOptions, TraceOutcome, trace};
-use abbe::identify::validate::validate;
 use abbe::model::session::Session;
+use abbe::trace::validate::validate;
+use abbe::trace::{TraceOptions, TraceOutcome, trace};
 use rayon::prelude::*;
 
 use super::rates::Rate;

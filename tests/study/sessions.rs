@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use abbe::files::{ReadOptions, session};
 use abbe::identify::results::TraceResult;
-use abbe::identify::trace::{TraceOptions, trace};
+use abbe::trace::{TraceOptions, trace};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;

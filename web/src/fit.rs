@@ -1,10 +1,10 @@
 //! A fit.
 
 use abbe::document::StatedFit;
-use abbe::identify::SessionFit;
 use abbe::report::block::Report;
 use abbe::report::commands::Commands;
 use abbe::report::{self, readings};
+use abbe::trace::SessionFit;
 use wasm_bindgen::prelude::*;
 
 use crate::failed::Failed;

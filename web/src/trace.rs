@@ -1,12 +1,12 @@
 //! A trace.
 
 use abbe::document::StatedTrace;
-use abbe::identify::trace::{self, Progress, TraceOptions, TraceOutcome};
 use abbe::plan::separating_tests::separate_aliases;
 use abbe::plan::test_variations::TestVariations;
 use abbe::report::block::Report;
 use abbe::report::commands::Commands;
 use abbe::report::{self, readings};
+use abbe::trace::{self, Progress, TraceOptions, TraceOutcome};
 use wasm_bindgen::prelude::*;
 
 use crate::failed::Failed;

@@ -35,7 +35,7 @@ use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::numerics::symmetric::Symmetric;
 use abbe_identify::numerics::tails::{chi_square_tail, normal_tail};
 use abbe_identify::parameters::Role;
-use abbe_identify::validate::machine::differences;
+use abbe_trace::validate::machine::differences;
 pub use inputs::{Input, compare_inputs};
 use results::{Comparison, Difference, NotComparable, OnlyIn, Pair};
 use shared::SharedDifference;

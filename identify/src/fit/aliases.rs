@@ -57,7 +57,7 @@ pub struct EffectAliases {
 ///
 /// # Errors
 /// If an alias cannot be evaluated.
-pub(crate) fn at_solution(problem: &Problem, beta: &[f64]) -> Result<Vec<EffectAliases>, IdentifyError> {
+pub fn at_solution(problem: &Problem, beta: &[f64]) -> Result<Vec<EffectAliases>, IdentifyError> {
     let effects = &problem.parameters.effects;
     if effects.iter().all(|effect| effect.covered_aliases().is_empty()) {
         return Ok(Vec::new());
@@ -138,7 +138,7 @@ fn largest(shifts: &[Vec<f64>], count: usize) -> Vec<f64> {
 }
 
 /// By how much uncertainties of functions of the parameters exceed those without aliases, as a contribution of its own.
-pub(crate) fn contribution(fit: &Fit, count: usize, values: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
+pub fn contribution(fit: &Fit, count: usize, values: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
     let mut squares = vec![0.0; count];
     for of_effect in shifts(fit, values) {
         squares.iter_mut().zip(largest(&of_effect, count)).for_each(|(sum, most)| *sum += most * most);

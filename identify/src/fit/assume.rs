@@ -42,7 +42,7 @@ pub fn assume(session: &Session, ids: &[String]) -> Result<Session, IdentifyErro
 
 /// What a model assumes of its effects, in words: the explanation, and how many others the readings do not separate from
 /// it.
-pub(crate) fn statements(problem: &Problem) -> Vec<String> {
+pub fn statements(problem: &Problem) -> Vec<String> {
     let effects = problem.parameters.effects.iter().filter(|effect| effect.assumed && !effect.aliases.is_empty());
     let words = effects.map(|effect| {
         let others = counted(effect.aliases.len(), "other explanation");

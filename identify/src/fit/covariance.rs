@@ -11,7 +11,7 @@ use crate::results::{Covariance, NullSpace, ParameterResult};
 
 /// Covariance of the reported parameters by the law of propagation of uncertainty, in their order and units. It has the
 /// same factor as the standard uncertainties and covers aliases as they do, so its diagonal holds their squares.
-pub(crate) fn of_parameters(problem: &Problem, fit: &Fit, parameters: &[ParameterResult]) -> Covariance {
+pub fn of_parameters(problem: &Problem, fit: &Fit, parameters: &[ParameterResult]) -> Covariance {
     let list = &problem.parameters.list;
     // Rows of the Jacobian of the reported quantities: their parameters, and the derivative by each.
     let mut rows: Vec<Vec<(usize, f64)>> = Vec::with_capacity(parameters.len());
@@ -73,7 +73,7 @@ fn adapt_diagonal(matrix: &mut Mat<f64>, parameters: &[ParameterResult]) {
 
 /// The null space in reduced row echelon form, in display units, over the parameters that take part in it, in their
 /// order.
-pub(crate) fn null_space(problem: &Problem, rank: &Rank) -> NullSpace {
+pub fn null_space(problem: &Problem, rank: &Rank) -> NullSpace {
     let list = &problem.parameters.list;
     let involved: Vec<usize> =
         (0..list.len()).filter(|j| rank.null_combinations.iter().any(|row| row[*j] != 0.0)).collect();

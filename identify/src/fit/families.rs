@@ -25,7 +25,6 @@ use faer::{Mat, Par, Side};
 use abbe_model::session::Prior;
 
 use crate::error::IdentifyError;
-use crate::heldout::paired::HeldOutDecrease;
 use crate::noise::NoiseSource;
 use crate::numerics::evidence::{NormalEquations, Posterior};
 use crate::numerics::parallel;
@@ -35,7 +34,7 @@ use crate::problem::Problem;
 
 /// A family of a problem: the effects that share a prior scale.
 #[derive(Clone, Debug)]
-pub(crate) struct Family {
+pub struct Family {
     /// Its name.
     pub name: String,
     /// Its coefficients, by index among the parameters.
@@ -43,7 +42,7 @@ pub(crate) struct Family {
 }
 
 /// The families of a problem whose scale is estimated, in the order of their first effects.
-pub(crate) fn families(parameters: &Parameters) -> Vec<Family> {
+pub fn families(parameters: &Parameters) -> Vec<Family> {
     let mut families: Vec<Family> = Vec::new();
     for (j, parameter) in parameters.list.iter().enumerate() {
         let Role::Coefficient { effect, .. } = parameter.role else { continue };
@@ -56,27 +55,12 @@ pub(crate) fn families(parameters: &Parameters) -> Vec<Family> {
     families
 }
 
-/// Effective number of parameters of an effect with a prior: `m − Σ C_jj/τ²`. `None` for an effect without one.
-pub(crate) fn effective_parameters(problem: &Problem, covariance: &Mat<f64>, effect: usize) -> Option<f64> {
-    let mut effective = 0.0;
-    for (j, parameter) in problem.parameters.list.iter().enumerate() {
-        match (parameter.role, parameter.prior) {
-            (Role::Coefficient { effect: of, .. }, Prior::Gaussian(scale)) if of == effect => {
-                effective += 1.0 - (covariance[(j, j)] / (scale * scale)).min(1.0);
-            }
-            (Role::Coefficient { effect: of, .. }, _) if of == effect => return None,
-            _ => {}
-        }
-    }
-    Some(effective)
-}
-
 /// The inflation that is tried first.
 const FIRST_INFLATION: f64 = 30.0;
 
 /// The readings of the folds in the form of normal equations, linearised at given parameters. Parameters are in
 /// physical sizes, those of one family in a common size. Readings are whitened with the noise of the problem.
-pub(crate) struct FoldEquations {
+pub struct FoldEquations {
     equations: NormalEquations,
     folds: Vec<FoldRows>,
     /// Number of scalar readings.
@@ -100,7 +84,7 @@ struct FoldRows {
 }
 
 /// The estimated scales, and the model that they give.
-pub(crate) struct Scales {
+pub struct Scales {
     /// Precision of each family, over scaled parameters.
     precisions: Vec<f64>,
     /// Variance of a reading in units of the whitening.
@@ -110,7 +94,7 @@ pub(crate) struct Scales {
     /// The posterior of the scaled parameters.
     posterior: Posterior,
     /// Sum of squares of the residual of each held-out fold, in units of the whitening.
-    held_out: Vec<f64>,
+    pub held_out: Vec<f64>,
 }
 
 impl Scales {
@@ -127,11 +111,6 @@ impl Scales {
     /// Effective number of parameters of each family.
     pub fn effective(&self) -> &[f64] {
         &self.posterior.effective
-    }
-
-    /// The decrease of the held-out error from another model of the same readings, by folds.
-    pub fn decrease_from(&self, other: &Scales) -> HeldOutDecrease {
-        HeldOutDecrease::over_blocks(&other.held_out, &self.held_out)
     }
 }
 

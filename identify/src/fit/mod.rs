@@ -5,13 +5,13 @@
 //! number. The law of propagation gives the uncertainties, `Cov = N (Nᵀ JᵀV⁻¹J N)⁻¹ Nᵀ`. The columns of `N` span the
 //! identifiable directions (JCGM 100, 5.2; JCGM 102, 6.2).
 
-pub(crate) mod aliases;
-pub(crate) mod assume;
+mod aliases;
+mod assume;
 pub mod base;
 mod covariance;
-pub(crate) mod families;
+pub mod families;
 pub(crate) mod numbers;
-pub(crate) mod outcome;
+pub mod outcome;
 mod prepare;
 mod quantities;
 mod reported;
@@ -31,16 +31,15 @@ use crate::numerics::tails::{chi_square_tail, residual_tail};
 use crate::numerics::triangle::Triangle;
 use crate::problem::Problem;
 
-pub use aliases::{AliasChange, EffectAliases};
-pub use assume::assume;
-pub(crate) use covariance::{null_space, of_parameters as covariance_of_parameters};
-pub use numbers::NumberInterval;
-pub(crate) use numbers::QUANTILE_95;
-pub use prepare::{prepare, with_lever};
-pub(crate) use prepare::{prepare_with, refit, with_families, with_families_linearised};
+pub use aliases::{
+    AliasChange, EffectAliases, at_solution as aliases_at_solution, contribution as contribution_of_aliases,
+};
+pub use assume::{assume, statements as assumptions};
+pub use covariance::{null_space, of_parameters as covariance_of_parameters};
+pub use numbers::{NumberInterval, QUANTILE_95};
+pub use prepare::{prepare, prepare_with, refit, with_families, with_families_linearised, with_lever};
 pub(crate) use quantities::{Quantity, quantities, values_at};
-pub(crate) use reported::{ids, rms_of_units};
-pub use reported::{outliers, parameters, report, unobservable};
+pub use reported::{ids, outliers, parameters, report, rms_of_units, unobservable};
 
 /// The result of a fit, in internal units.
 #[derive(Clone, Debug)]
@@ -138,7 +137,7 @@ pub(crate) fn linearised(problem: &Problem, beta: Vec<f64>, near: Linearisation)
 }
 
 /// The minimum of the sum of squares of readings and priors.
-pub(crate) struct Minimum {
+pub struct Minimum {
     /// Estimates of all parameters, in internal units (mm, rad).
     pub beta: Vec<f64>,
     /// The triangular factors of the folds at `beta`.
@@ -151,7 +150,7 @@ pub(crate) struct Minimum {
 ///
 /// # Errors
 /// If the model cannot be evaluated, or the iterations do not converge.
-pub(crate) fn minimum(problem: &Problem, start: Option<&[f64]>) -> Result<Minimum, IdentifyError> {
+pub fn minimum(problem: &Problem, start: Option<&[f64]>) -> Result<Minimum, IdentifyError> {
     let (rank, last) = rank_at_nominal(problem)?;
     let restricted = IdentifiableDirections { problem, rank: &rank, last: RefCell::new(last) };
     let mut end = None;

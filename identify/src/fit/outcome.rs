@@ -22,7 +22,7 @@ use crate::results::{
 const MIN_RATIO: f64 = 0.5;
 
 /// The residual of a fit against the noise.
-pub(crate) fn goodness(problem: &Problem, fit: &Fit) -> Goodness {
+pub fn goodness(problem: &Problem, fit: &Fit) -> Goodness {
     let chi_square_ratio = fit.chi_square / fit.degrees_of_freedom as f64;
     let judged = problem.noise.source.judges();
     let verdict = if !judged {
@@ -39,7 +39,7 @@ pub(crate) fn goodness(problem: &Problem, fit: &Fit) -> Goodness {
 }
 
 /// What determines each parameter of a problem, by index, and the errors that set-up priors determine, in words.
-pub(crate) struct Determined {
+pub struct Determined {
     by: Vec<DeterminedBy>,
     by_prior: Vec<DeterminedByPrior>,
 }
@@ -108,7 +108,7 @@ impl Determined {
 }
 
 /// What a fit is worth.
-pub(crate) fn outcome(problem: &Problem, fit: &Fit, goodness: Goodness, determined: &Determined) -> Outcome {
+pub fn outcome(problem: &Problem, fit: &Fit, goodness: Goodness, determined: &Determined) -> Outcome {
     Outcome {
         goodness,
         determined_by_prior: determined.by_prior.clone(),

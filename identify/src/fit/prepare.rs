@@ -42,7 +42,7 @@ pub fn prepare(session: &Session, seed: u64) -> Result<(Problem, Fit), IdentifyE
 ///
 /// # Errors
 /// See [`prepare`].
-pub(crate) fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), IdentifyError> {
+pub fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), IdentifyError> {
     let (problem, mut fit) = prepare_at_noise(session, effects, seed)?;
     fit.intervals = intervals(&problem, &fit)?;
     Ok((problem, fit))
@@ -52,7 +52,7 @@ pub(crate) fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> 
 ///
 /// # Errors
 /// If the iterations do not converge.
-pub(crate) fn refit(problem: &mut Problem, present: &Fit) -> Result<Fit, IdentifyError> {
+pub fn refit(problem: &mut Problem, present: &Fit) -> Result<Fit, IdentifyError> {
     let mut fit = fit_with_numbers(problem, Some(&present.beta))?;
     fit.intervals = intervals(problem, &fit)?;
     Ok(fit)
@@ -184,7 +184,7 @@ fn settled(mut problem: Problem, stated: bool, floor: f64) -> Result<(Problem, F
 ///
 /// # Errors
 /// See [`prepare`].
-pub(crate) fn with_families(problem: Problem, start: Vec<f64>) -> Result<(Problem, Fit), IdentifyError> {
+pub fn with_families(problem: Problem, start: Vec<f64>) -> Result<(Problem, Fit), IdentifyError> {
     in_turn_with_families(problem, start, |problem, beta: Vec<f64>, _| super::fit(problem, Some(&beta)))
 }
 
@@ -193,7 +193,7 @@ pub(crate) fn with_families(problem: Problem, start: Vec<f64>) -> Result<(Proble
 ///
 /// # Errors
 /// See [`prepare`].
-pub(crate) fn with_families_linearised(problem: Problem, start: Vec<f64>) -> Result<(Problem, Fit), IdentifyError> {
+pub fn with_families_linearised(problem: Problem, start: Vec<f64>) -> Result<(Problem, Fit), IdentifyError> {
     in_turn_with_families(problem, start, super::linearised)
 }
 

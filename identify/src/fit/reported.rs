@@ -8,7 +8,7 @@ use super::{Fit, covariance, enlargement_warning};
 use super::{aliases, assume};
 use crate::circular;
 use crate::error::IdentifyError;
-use crate::heldout::figures::cross_validation;
+use crate::heldout::cross_validation;
 use crate::heldout::{mislabelled_runs, rms_by_unit_mm, rms_mm};
 use crate::noise;
 use crate::numerics::rank::Rank;
@@ -88,11 +88,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
 
 /// Root mean square of residuals and of held-out residuals, mm: of the lengths, if there are angles too, whose figures are
 /// apart.
-pub(crate) fn rms_of_units(
-    problem: &Problem,
-    residuals: &[Vec<f64>],
-    held_out: &[Vec<f64>],
-) -> (f64, f64, Option<OfAngles>) {
+pub fn rms_of_units(problem: &Problem, residuals: &[Vec<f64>], held_out: &[Vec<f64>]) -> (f64, f64, Option<OfAngles>) {
     let arcsec = |mm: f64| mm / problem.session.lever_mm * ARCSEC;
     match [residuals, held_out].map(|residuals| rms_by_unit_mm(problem, residuals)) {
         [[Some(rms), Some(of_angles)], [Some(held), Some(held_of_angles)]] => {
@@ -184,7 +180,7 @@ fn amplitude_and_phase(problem: &Problem, fit: &Fit, j: usize) -> [ParameterResu
 }
 
 /// The identifiers of parameters.
-pub(crate) fn ids(parameters: &[ParameterResult]) -> Vec<String> {
+pub fn ids(parameters: &[ParameterResult]) -> Vec<String> {
     parameters.iter().map(|parameter| parameter.id.clone()).collect()
 }
 

@@ -19,7 +19,7 @@ use crate::results::{CrossValidation, TestNotLeftOut};
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub(crate) fn cross_validation(
+pub fn cross_validation(
     problem: &Problem,
     fit: &Fit,
     deciding_mm: f64,

@@ -179,7 +179,7 @@ const SHORT_RUN: f64 = 4.0;
 const MIN_READINGS: usize = 24;
 
 /// A warning for each test whose run column does not number traversals: its number changes from reading to reading.
-pub(crate) fn mislabelled_runs(tests: &[Test]) -> Vec<String> {
+pub fn mislabelled_runs(tests: &[Test]) -> Vec<String> {
     let warning = |test: &Test| {
         let readings = test.readings.as_ref()?;
         let runs = readings.runs();

@@ -77,8 +77,9 @@ pub(super) fn poses(readings: &[&Readings]) -> Vec<usize> {
     of_row
 }
 
-/// The coordinates of every row.
-pub(crate) fn coordinates(machine: &Machine, readings: &[&Readings]) -> Vec<Point> {
+/// The place of every row in joint space, over all tests: for each linear axis that moves its position, from −1 to 1 over the
+/// readings, for each rotary axis its cosine and sine.
+pub fn coordinates(machine: &Machine, readings: &[&Readings]) -> Vec<Point> {
     let mut points = vec![Point::new(); readings.iter().map(|r| r.rows()).sum()];
     for (number, axis) in machine.axes.iter().enumerate() {
         let positions = || readings.iter().flat_map(move |r| r.positions[number].iter().copied());
@@ -95,7 +96,8 @@ pub(crate) fn coordinates(machine: &Machine, readings: &[&Readings]) -> Vec<Poin
     points
 }
 
-pub(crate) fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
+/// The square of the distance of two points of joint space, in the units of [`coordinates`].
+pub fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum()
 }
 

@@ -14,7 +14,7 @@ mod autocorrelation;
 mod flange;
 pub mod outliers;
 mod stated;
-mod trends;
+pub mod trends;
 mod waves;
 
 use abbe_model::session::Test;
@@ -25,10 +25,9 @@ use serde::{Deserialize, Serialize};
 
 pub use autocorrelation::Autocorrelation;
 pub(crate) use autocorrelation::enlargement_of_mean;
-pub(crate) use stated::{silent_channels, stated_against_repeats};
-#[cfg(test)]
-pub(crate) use trends::trend_terms;
-pub(crate) use trends::{TERMS, Trends};
+pub(crate) use stated::silent_channels;
+pub use stated::stated_against_repeats;
+use trends::Trends;
 
 /// The noise of one scalar reading.
 #[derive(Clone, Debug, PartialEq)]
@@ -121,7 +120,7 @@ impl Noise {
 
 /// A noise that the readings show without a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ShownNoise {
+pub struct ShownNoise {
     /// Standard deviation, mm.
     pub sigma_mm: f64,
     /// Degrees of freedom.
@@ -189,7 +188,7 @@ impl PureError {
     }
 
     /// The factor on the deviations of a test for the removed trends.
-    pub(crate) fn rescaling(&self, test: usize) -> f64 {
+    pub fn rescaling(&self, test: usize) -> f64 {
         self.rescaling_of_tests[test]
     }
 

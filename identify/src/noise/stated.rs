@@ -11,7 +11,7 @@ const DISAGREEMENT_P: f64 = 0.001;
 
 /// A warning if repeated readings scatter by more than twice or less than half of the stated noise, significantly.
 /// `residuals` are those of any model, mm, test by test.
-pub(crate) fn stated_against_repeats(problem: &Problem, residuals: &[Vec<f64>]) -> Option<String> {
+pub fn stated_against_repeats(problem: &Problem, residuals: &[Vec<f64>]) -> Option<String> {
     let stated_mm = problem.session.stated_noise_mm()?;
     let pure = PureError::of(&problem.tests, residuals, |test, row| !problem.rejected[test][row]);
     let sigma_mm = pure.sigma_mm()?;

@@ -3,7 +3,7 @@
 use abbe_model::session::readings::Readings;
 
 /// Terms of the trend of a long run: constant, slope, curvature, and sine and cosine of one cycle over the run.
-pub(crate) const TERMS: usize = 5;
+pub const TERMS: usize = 5;
 /// Number of powers of time among the terms.
 const POWERS: usize = 3;
 /// Least number of readings of a run for the cycle and for the search for waves.
@@ -22,7 +22,7 @@ fn powers(readings: usize) -> usize {
 }
 
 /// The terms of a trend, orthonormal over the given times (Gram–Schmidt, twice). Terms that need more times are zero.
-pub(crate) fn trend_terms(times: &[f64]) -> Vec<[f64; TERMS]> {
+pub fn trend_terms(times: &[f64]) -> Vec<[f64; TERMS]> {
     let n = times.len() as f64;
     let powers = powers(times.len());
     let middle = times.iter().sum::<f64>() / n;
@@ -52,7 +52,7 @@ pub(crate) fn trend_terms(times: &[f64]) -> Vec<[f64; TERMS]> {
 }
 
 /// The trends of the runs of a test.
-pub(crate) struct Trends {
+pub struct Trends {
     /// The run of each row.
     run: Vec<usize>,
     /// The terms of that run's trend at each row; zero for excluded rows.

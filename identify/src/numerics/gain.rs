@@ -9,13 +9,13 @@ use super::symmetric::{Symmetric, eigen_of_two};
 use super::tolerances::MIN_OBSERVABLE;
 
 /// `gᵀ D⁻¹ g` on the observable directions. `own` is the product before projection.
-pub(crate) fn quadratic_gain(d: &Mat<f64>, own: &Mat<f64>, g: &[f64]) -> f64 {
+pub fn quadratic_gain(d: &Mat<f64>, own: &Mat<f64>, g: &[f64]) -> f64 {
     ObservableSubspace::of(d, own).quadratic(g)
 }
 
 /// `gᵀ D⁻¹ g` of one or two columns, and the number of observable directions. `own` are the squared lengths before
 /// projection.
-pub(crate) fn gain_of_few(count: usize, d: [[f64; 2]; 2], own: [f64; 2], g: [f64; 2]) -> (f64, usize) {
+pub fn gain_of_few(count: usize, d: [[f64; 2]; 2], own: [f64; 2], g: [f64; 2]) -> (f64, usize) {
     let scale = own.map(|own| if own > 0.0 { 1.0 / own.sqrt() } else { 0.0 });
     let scaled = |k: usize, l: usize| d[k][l] * scale[k] * scale[l];
     let pairs = match count {
@@ -30,7 +30,7 @@ pub(crate) fn gain_of_few(count: usize, d: [[f64; 2]; 2], own: [f64; 2], g: [f64
 }
 
 /// The inverse of a projected product on its observable directions.
-pub(crate) struct ObservableSubspace {
+pub struct ObservableSubspace {
     vectors: Mat<f64>,
     /// The inverse of each eigenvalue; zero for a direction that is not observable.
     values: Vec<f64>,

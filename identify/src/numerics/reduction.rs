@@ -88,7 +88,7 @@ pub fn inverse_of_upper(r: MatRef<'_, f64>) -> Mat<f64> {
 
 /// Orthonormal columns of the space of the columns of a matrix, by pivoting. `negligible` is the share of the first pivot
 /// below which a pivot is a rounding error.
-pub(crate) fn orthonormal_basis(matrix: &Mat<f64>, negligible: f64) -> Mat<f64> {
+pub fn orthonormal_basis(matrix: &Mat<f64>, negligible: f64) -> Mat<f64> {
     if matrix.nrows() == 0 || matrix.ncols() == 0 {
         return Mat::zeros(matrix.nrows(), 0);
     }

@@ -116,7 +116,7 @@ impl Svd {
 }
 
 /// `A⁻¹ B` of a regular square matrix.
-pub(crate) fn solve_square(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
+pub fn solve_square(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     a.partial_piv_lu().solve(b)
 }
 

@@ -11,8 +11,9 @@ use crate::results::COVERAGE_FACTOR;
 /// Largest coefficient, in physical sizes of its component: 100 mm, 1 rad.
 const MAX_SIZES: f64 = 100.0;
 
-/// One warning for each effect with a coefficient that is larger than [`MAX_SIZES`] by more than its expanded uncertainty.
-pub(crate) fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
+/// One warning for each effect with a coefficient that exceeds 100 mm or 1 rad of its component by more than its expanded
+/// uncertainty.
+pub fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
     let mut named: Vec<usize> = Vec::new();
     let mut warnings = Vec::new();
     for (j, parameter) in problem.parameters.list.iter().enumerate() {

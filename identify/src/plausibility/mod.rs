@@ -11,7 +11,7 @@
 //!
 //! Mistakes are found by refits of the session with one statement changed at a time (`hypotheses`, `suggest`).
 
-pub(crate) mod coefficients;
+pub mod coefficients;
 mod hypotheses;
 mod locations;
 mod poses;
@@ -19,14 +19,12 @@ mod pulls;
 mod quick_fit;
 mod results;
 mod suggest;
-mod tracing;
 
-use abbe_model::session::{Prior, Session};
+use abbe_model::session::Session;
 
 use abbe_model::words::first_of;
 pub use pulls::{Pull, Pulls};
 pub use results::{Conflict, ConflictKind, Plausibility, Suggestion, SuggestionKind};
-pub(crate) use tracing::{is_another_session, with_set_ups_freed};
 
 use crate::error::IdentifyError;
 use crate::fit::Fit;
@@ -308,12 +306,6 @@ fn of_poses(problem: &Problem, fit: &Fit) -> Plausibility {
 /// others the residual, mm. Ways to read one file are compared by it. `None` if the set-up cannot be estimated.
 pub fn nominal_misfit(session: &Session) -> Option<f64> {
     poses::nominal_misfit(session)
-}
-
-/// Whether any set-up parameter has a stated uncertainty.
-fn has_priors(problem: &Problem) -> bool {
-    let list = &problem.parameters.list;
-    list.iter().any(|parameter| matches!(parameter.prior, Prior::Gaussian(_)))
 }
 
 #[cfg(test)]

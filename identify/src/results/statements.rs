@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use super::outcome::{Goodness, TraceVerdict};
 use super::parameter::{DeterminedBy, ParameterResult};
+use crate::results::validation::ValidationVerdict;
 use crate::tolerance::rule::Decision;
-use crate::validate::results::ValidationVerdict;
 
 /// A component of an axis line or a direction, or the zero of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]

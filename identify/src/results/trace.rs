@@ -386,6 +386,44 @@ pub struct TraceResult {
     pub about: BTreeMap<String, String>,
 }
 
+impl TraceResult {
+    /// Marks a result as that of an interrupted trace: a field, the verdict, and a warning.
+    pub fn mark_interrupted(&mut self) {
+        self.interrupted = true;
+        self.verdict = TraceVerdict::Incomplete;
+        self.warnings.push(self.incompleteness());
+    }
+
+    /// States that a time limit of the caller interrupted the trace. A trace that was not interrupted is not changed.
+    pub fn mark_time_limit(&mut self, seconds: f64) {
+        if self.interrupted {
+            let before = self.incompleteness();
+            self.time_limit_s = Some(seconds);
+            let now = self.incompleteness();
+            self.warnings.iter_mut().filter(|warning| **warning == before).for_each(|w| w.clone_from(&now));
+        }
+    }
+
+    fn incompleteness(&self) -> String {
+        format!(
+            "the trace was {}: effects may be missing from the model, and the residual was not examined for structure",
+            self.interruption()
+        )
+    }
+
+    /// The state at the interruption, for example `interrupted after 2 effects`.
+    pub fn interruption(&self) -> String {
+        let effects = match self.effects.len() {
+            1 => "1 effect".to_string(),
+            count => format!("{count} effects"),
+        };
+        match self.time_limit_s {
+            Some(seconds) => format!("interrupted by the time limit of {seconds} s after {effects}"),
+            None => format!("interrupted after {effects}"),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::EffectName;

@@ -22,13 +22,13 @@ mod indices;
 mod sequence;
 
 use abbe_identify::IdentifyError;
-use abbe_identify::candidates::columns::Columns;
-use abbe_identify::candidates::library;
 use abbe_identify::linear::{Linearisation, is_of_interest, prior_u};
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_identify::quantity::Given;
 use abbe_model::session::Prior;
+use abbe_trace::candidates::columns::Columns;
+use abbe_trace::candidates::library;
 use faer::Mat;
 use indices::Design;
 use rand_distr::{Distribution, StandardNormal};

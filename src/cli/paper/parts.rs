@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use abbe::identify::SessionFit;
-use abbe::identify::candidates::named::effect;
 use abbe::identify::problem::Problem;
 use abbe::model::effect::Effect;
 use abbe::model::session::Session;
 use abbe::plan::bias::{bias_table, usual_effects};
 use abbe::plan::structure::structure;
 use abbe::plan::{self, PlanOptions};
+use abbe::trace::SessionFit;
+use abbe::trace::candidates::named::effect;
 
 use super::PaperArguments;
 use crate::cli::failure::Failure;

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use abbe::codegen::nc::Control;
 use abbe::files::{self, ReadOptions, SourceMap};
-use abbe::identify::trace::TraceOutcome;
 use abbe::model::ModelError;
 use abbe::model::document::edit::SessionText;
 use abbe::model::effect::Effect;
 use abbe::model::session::Session;
+use abbe::trace::TraceOutcome;
 use clap::Args;
 
 use crate::cli::failure::Failure;

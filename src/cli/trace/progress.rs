@@ -3,12 +3,12 @@
 use std::sync::Mutex;
 use std::time::Duration;
 
-use abbe::identify::candidates::library;
-use abbe::identify::trace::{self, Progress, TraceOptions, TraceOutcome};
 use abbe::model::session::Session;
 use abbe::model::words::counted;
 use abbe::plan::separating_tests::separate_aliases;
 use abbe::plan::test_variations::TestVariations;
+use abbe::trace::candidates::library;
+use abbe::trace::{self, Progress, TraceOptions, TraceOutcome};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::clock::Clock;

@@ -69,8 +69,8 @@ pub(super) fn chi_square(session: &Session, noise_mm: f64) -> Result<f64, Identi
 #[cfg(test)]
 mod tests {
     use abbe_files::ReadOptions;
-    use abbe_identify::trace::TraceOptions;
-    use abbe_identify::trace::screening::screened_effects;
+    use abbe_trace::TraceOptions;
+    use abbe_trace::screening::screened_effects;
 
     use super::*;
 

@@ -1,13 +1,13 @@
 //! What the sections hold: selections of the tables and figures of a plan and of a fit.
 
 use abbe::identify::IdentifyError;
-use abbe::identify::SessionFit;
 use abbe::identify::problem::Problem;
 use abbe::identify::series::{paths, views};
 use abbe::model::words::counted;
 use abbe::plan::bias::BiasTable;
 use abbe::plan::results::PlanAnalysis;
 use abbe::plan::structure::Structure;
+use abbe::trace::SessionFit;
 
 use super::{Part, Subject};
 use crate::report::block::{Formula, Report};

@@ -90,7 +90,9 @@ fn a_silent_return_is_recognised() {
 #[test]
 fn no_test_returns_before_its_assertions_without_a_word() {
     let mut files = Vec::new();
-    for folder in ["tests", "model/tests", "files/tests", "identify/tests", "apply/tests", "codegen/tests"] {
+    for folder in
+        ["tests", "model/tests", "files/tests", "identify/tests", "trace/tests", "apply/tests", "codegen/tests"]
+    {
         rust_files(&workspace().join(folder), &mut files);
     }
     assert!(files.len() > 100, "{files:?}");

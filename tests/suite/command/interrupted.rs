@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 
 use abbe::files::{self, ReadOptions};
 use abbe::identify::results::TraceResult;
-use abbe::identify::trace::{Progress, TraceOptions, TraceOutcome, trace};
 use abbe::model::session::Session;
+use abbe::trace::{Progress, TraceOptions, TraceOutcome, trace};
 
 use crate::suite::{ready, text};
 

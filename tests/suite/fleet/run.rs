@@ -146,7 +146,7 @@ fn every_record_is_described_by_its_schema() {
 fn the_build_is_known_by_its_sources() {
     let script = r#"
         awk 'BEGIN { RS = "\\[\\[package\\]\\]"; ORS = "" } /\nchecksum = / { print }' Cargo.lock
-        find model/src files/src identify/src src/fleet -type f ! -name '.*' | LC_ALL=C sort | while read -r name; do
+        find model/src files/src identify/src trace/src src/fleet -type f ! -name '.*' | LC_ALL=C sort | while read -r name; do
             printf '%s\n' "$name"
             printf "$(sha256sum "$name" | cut -c1-64 | sed 's/../\\x&/g')"
         done"#;

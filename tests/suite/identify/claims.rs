@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use abbe::files::{self, ReadOptions};
 use abbe::identify::results::{EffectName, TraceResult, TraceVerdict};
-use abbe::identify::trace::{TraceOptions, trace};
 use abbe::model::session::Session;
+use abbe::trace::{TraceOptions, trace};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;

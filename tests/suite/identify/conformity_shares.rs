@@ -5,13 +5,13 @@ use std::f64::consts::TAU;
 
 use abbe::files::read::add_node;
 use abbe::files::table::memory::MemoryColumn;
-use abbe::identify::SessionFit;
 use abbe::identify::tolerance::rule::Decision;
 use abbe::model::chain::Machine;
 use abbe::model::component::ErrorName;
 use abbe::model::instrument::InstrumentKind;
 use abbe::model::session::Session;
 use abbe::model::session::tolerance::{Limit, Tolerance, Toleranced};
+use abbe::trace::SessionFit;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use serde_json::json;

@@ -1,12 +1,12 @@
 //! A left-out test is predicted by the right component and not by its alias.
 
 use abbe::files::{self, ReadOptions};
-use abbe::identify::SessionFit;
 use abbe::identify::results::FitResult;
 use abbe::model::driver::Driver as FollowedDriver;
 use abbe::model::effect::shape::Harmonic;
 use abbe::model::effect::{Component as Moved, Effect, Shape as Form};
 use abbe::model::session::Session;
+use abbe::trace::SessionFit;
 
 use crate::plant::machine::{Machine, Stated};
 use crate::plant::schedule::{Motion, Test, all_stand, with};

@@ -5,7 +5,7 @@ use abbe::identify::results::TraceVerdict;
 use std::f64::consts::FRAC_PI_2;
 
 use abbe::files::{self, ReadOptions};
-use abbe::identify::trace::{TraceOptions, TraceOutcome, trace};
+use abbe::trace::{TraceOptions, TraceOutcome, trace};
 
 use crate::plant::machine::Stated;
 use crate::plant::rtest::{Nest, NestOn, Session};

@@ -5,9 +5,9 @@ use abbe::files::{self, ReadOptions};
 use abbe::identify::model_file::{IdentifiedModel, Provenance};
 use abbe::identify::results::TraceVerdict;
 use abbe::identify::results::{EffectName, TraceResult};
-use abbe::identify::trace::{TraceOptions, trace};
-use abbe::identify::validate::validate;
 use abbe::model::session::Session;
+use abbe::trace::validate::validate;
+use abbe::trace::{TraceOptions, trace};
 use test_needs::data;
 
 use crate::suite::identify::robots::session_on_public_data;

@@ -11,7 +11,6 @@ use abbe::identify::problem::Problem;
 use abbe::identify::quantity::Given;
 use abbe::identify::results::EffectName;
 use abbe::identify::simulate::{Simulation, simulate};
-use abbe::identify::trace::{TraceOptions, trace};
 use abbe::model::driver::Driver;
 use abbe::model::effect::shape::{Harmonic, Local};
 use abbe::model::effect::{Component, Effect, Shape};
@@ -19,6 +18,7 @@ use abbe::model::session::Session;
 use abbe::plan::candidate_tests::candidate_tests;
 use abbe::plan::separating_tests::separate_aliases;
 use abbe::plan::test_variations::TestVariations;
+use abbe::trace::{TraceOptions, trace};
 
 use crate::suite::{abbe, ready, text};
 

@@ -7,8 +7,8 @@ use abbe::identify::fit::base::{Gauge, base_parameters, report};
 use abbe::identify::fit::prepare;
 use abbe::identify::model_file::{IdentifiedModel, Provenance};
 use abbe::identify::parameters::Role;
-use abbe::identify::validate::validate;
 use abbe::model::session::Session;
+use abbe::trace::validate::validate;
 use serde_json::{Value, json};
 
 use crate::suite::identify::robots::session_on_public_data;

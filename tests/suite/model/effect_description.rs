@@ -4,7 +4,6 @@ use std::collections::{BTreeSet, HashMap};
 use std::fmt::Write;
 
 use abbe::files::{ReadOptions, session as read};
-use abbe::identify::candidates::library;
 use abbe::identify::problem::Problem;
 use abbe::model::chain::Machine;
 use abbe::model::component::{ErrorKind, Freedom};
@@ -13,6 +12,7 @@ use abbe::model::effect::description::{component_meaning, explanations, meaning}
 use abbe::model::effect::shape::{Harmonic, Periodic, Power, Steps, Warmup};
 use abbe::model::effect::{Component, Effect, Shape};
 use abbe::model::session::Session;
+use abbe::trace::candidates::library;
 
 use crate::suite::plan::help::{noise_um, ready};
 use crate::suite::workspace;

@@ -2,7 +2,6 @@
 
 use std::f64::consts::PI;
 
-use abbe::identify::candidates::library;
 use abbe::model::driver::Driver;
 use abbe::model::effect::Shape;
 use abbe::model::effect::shape::Power;
@@ -10,6 +9,7 @@ use abbe::model::session::Session;
 use abbe::plan::effects::effects;
 use abbe::plan::results::EffectDetectability;
 use abbe::plan::states;
+use abbe::trace::candidates::library;
 
 use crate::suite::plan::help::{machine, noise_um, session};
 

@@ -179,7 +179,7 @@ fn shares_agree_with_differences_of_the_model() {
 #[test]
 fn a_trace_reports_the_steps_of_its_search_and_the_competing_explanations() {
     let session = session(&ready("hermle-c600u/measured/session.toml"));
-    let trace = abbe::identify::trace::trace(&session, &Default::default(), &|_| true).unwrap();
+    let trace = abbe::trace::trace(&session, &Default::default(), &|_| true).unwrap();
     let [competing_effects] = trace.competing_effects.as_slice() else {
         panic!("one effect was simulated, {} were found", trace.competing_effects.len());
     };

@@ -8,7 +8,7 @@ use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::plausibility::{Plausibility, Pulls, Suggestion, SuggestionKind, examine, warnings};
 use abbe::identify::results::TraceVerdict;
-use abbe::identify::trace::{TraceOptions, trace};
+use abbe::trace::{TraceOptions, trace};
 
 use crate::plant::Noise;
 use sessions::{MISTAKES, Mistake, STEPS_DEG, session};

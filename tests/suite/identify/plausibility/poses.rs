@@ -8,8 +8,8 @@ use abbe::identify::IdentifyError;
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::plausibility::{ConflictKind, SuggestionKind};
 use abbe::identify::results::FitResult;
-use abbe::identify::trace::{TraceOptions, trace};
 use abbe::model::session::Session;
+use abbe::trace::{TraceOptions, trace};
 use test_needs::data;
 
 use crate::suite::ready;

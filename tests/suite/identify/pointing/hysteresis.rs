@@ -2,7 +2,7 @@
 //! by the direction of its last move, and without it.
 
 use abbe::identify::results::{EffectResult, TraceResult};
-use abbe::identify::trace::{TraceOptions, trace};
+use abbe::trace::{TraceOptions, trace};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;

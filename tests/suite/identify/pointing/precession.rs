@@ -5,7 +5,7 @@ use std::path::Path;
 
 use abbe::files::{self, ReadOptions};
 use abbe::identify::results::{EffectResult, TraceResult};
-use abbe::identify::trace::{TraceOptions, trace};
+use abbe::trace::{TraceOptions, trace};
 use serde_json::Value;
 
 fn traced(name: &str) -> (TraceResult, Value) {

@@ -1,0 +1,159 @@
+//! The result of a validation, as JSON has it.
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::noise::NoiseSource;
+use crate::results::ParameterResult;
+use crate::unit::ReadingUnit;
+
+/// The verdict on a saved model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ValidationVerdict {
+    /// All readings are consistent with the model.
+    Holds,
+    /// Those inside the range of the model's data are.
+    HoldsInRange,
+    /// Neither, but the model is better than the location errors alone.
+    Degraded,
+    /// Neither, and the model is no better than those.
+    DoesNotHold,
+}
+
+impl ValidationVerdict {
+    /// The word in results.
+    pub fn word(self) -> &'static str {
+        match self {
+            ValidationVerdict::Holds => "holds",
+            ValidationVerdict::HoldsInRange => "holds-in-range",
+            ValidationVerdict::Degraded => "degraded",
+            ValidationVerdict::DoesNotHold => "does-not-hold",
+        }
+    }
+}
+
+impl fmt::Display for ValidationVerdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.word())
+    }
+}
+
+/// A saved model against readings that it never saw.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ValidationResult {
+    /// `holds`, `holds-in-range`, `degraded` or `does-not-hold`.
+    pub verdict: ValidationVerdict,
+    /// Number of readings without outliers.
+    pub readings: usize,
+    /// Number of them inside the range of the model's data.
+    pub readings_in_range: usize,
+    /// The axes and drivers whose range readings leave.
+    pub outside: Vec<String>,
+    /// Number of readings excluded as outliers.
+    pub outliers: usize,
+    /// Standard deviation of one scalar reading, µm.
+    pub noise_um: f64,
+    /// The unit of the figures of readings, in which their keys end; absent for µm.
+    #[serde(skip_serializing_if = "ReadingUnit::is_micrometre")]
+    pub reading_unit: ReadingUnit,
+    /// Source of `noise_um`: `repeats` or `stated` by the session, or `model`: the noise of the model's readings where
+    /// the session has neither; the model's held-out rms where the model's readings have neither.
+    pub noise_source: NoiseSource,
+    /// The machine without errors.
+    pub nominal: RmsResult,
+    /// Location errors as the model's readings give them without any effect.
+    pub locations: RmsResult,
+    /// The whole model.
+    pub model: ValidatedModel,
+    /// The model without each effect.
+    pub without: Vec<WithoutResult>,
+    /// Parameters that have changed, the most significant first. Where the residual of all readings is not as predicted,
+    /// from the readings inside the range.
+    pub moved: Vec<MovedParameter>,
+    /// The estimated set-up of the session.
+    pub set_up: Vec<ParameterResult>,
+    /// Warnings in words.
+    pub warnings: Vec<String>,
+}
+
+/// Root mean square of the residual.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct RmsResult {
+    /// Over scalar readings, µm.
+    pub rms_um: f64,
+    /// Length of the residual vector, µm, for instruments with three coordinates.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_3d_um: Option<f64>,
+    /// `√(χ²/ν)` of the residual over the noise and of the set-up over its priors; 1 if noise alone remains. It also
+    /// shows errors of the machine that the set-up absorbs.
+    pub noise_ratio: f64,
+}
+
+/// The whole model.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ValidatedModel {
+    /// Residual.
+    #[serde(flatten)]
+    pub rms: RmsResult,
+    /// Rms of the residual as noise and uncertainty of the model predict it, µm.
+    pub predicted_rms_um: f64,
+    /// `√(χ²/ν)` of the whitened residual: found over predicted.
+    pub residual_ratio: f64,
+    /// χ² of the residual with the predicted covariance.
+    pub chi_square: f64,
+    /// Degrees of freedom of χ².
+    pub degrees_of_freedom: usize,
+    /// Probability of a larger χ² if the model holds.
+    pub p_value: f64,
+    /// The readings inside the range, with the set-up that they give; absent if all or none are inside.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub in_range: Option<InRangeResult>,
+    /// Share of scalar readings inside their 95 % prediction intervals.
+    pub coverage_95: f64,
+}
+
+/// The readings inside the range of the model's data.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct InRangeResult {
+    /// Residual.
+    #[serde(flatten)]
+    pub rms: RmsResult,
+    /// Rms of the residual as noise and uncertainty of the model predict it, µm.
+    pub predicted_rms_um: f64,
+    /// `√(χ²/ν)`: found over predicted.
+    pub residual_ratio: f64,
+    /// Probability of a larger χ² if the model holds.
+    pub p_value: f64,
+    /// Share of scalar readings inside their 95 % prediction intervals.
+    pub coverage_95: f64,
+}
+
+/// The model without one effect.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct WithoutResult {
+    /// The effect.
+    pub effect: String,
+    /// Residual.
+    #[serde(flatten)]
+    pub rms: RmsResult,
+}
+
+/// A parameter that has changed.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct MovedParameter {
+    /// The parameter.
+    pub id: String,
+    /// Its change since the model, in `unit`.
+    pub value: f64,
+    /// Standard uncertainty of the change, in `unit`.
+    pub u: f64,
+    /// Unit of `value` and `u`.
+    pub unit: String,
+    /// Probability of such a change by chance in any parameter of an unchanged machine.
+    pub p_value: f64,
+    /// Parameters whose change explains these readings nearly as well (χ² larger by less than 4).
+    pub alternatives: Vec<String>,
+}

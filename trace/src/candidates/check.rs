@@ -1,0 +1,196 @@
+//! The products of candidates against least squares on their rows.
+
+use std::fmt::Write;
+use std::path::Path;
+use std::sync::Arc;
+
+use abbe_files::ReadOptions;
+use abbe_identify::fit::prepare;
+use abbe_identify::problem::Problem;
+use faer::Mat;
+use faer::linalg::solvers::SolveLstsq;
+
+use super::columns::{Columns, EffectColumns};
+use super::gain::TrainedModel;
+use super::gram::{Gram, PriorGram};
+use super::library;
+use super::tuned::TunedChannel;
+
+/// The bundled session with some readings rejected and noise of a given autocorrelation.
+fn problem(ar_coefficients: &[f64]) -> (Problem, Vec<f64>) {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+    let (mut problem, fit) = prepare(&abbe_files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
+    problem.noise.ar_coefficients = ar_coefficients.to_vec();
+    for (test, row) in [(0, 3), (0, 40), (1, 41), (2, 0), (3, 77)] {
+        problem.rejected[test][row] = true;
+    }
+    (problem, fit.beta)
+}
+
+/// Orthonormal columns of the fitted model, and its residual: whitened rows in fold order.
+fn model(columns: &Columns<'_>, beta: &[f64]) -> (Mat<f64>, Vec<f64>) {
+    let rows = columns.model_rows(beta).unwrap();
+    let svd = rows.as_ref().subcols(0, beta.len()).thin_svd().unwrap();
+    let rank = svd.S().column_vector().iter().filter(|value| **value > 1e-6 * svd.S().column_vector()[0]).count();
+    let residual = (0..rows.nrows()).map(|i| rows[(i, beta.len())]).collect();
+    (svd.U().subcols(0, rank).to_owned(), residual)
+}
+
+/// The library's candidates, one in `every`, and those with most columns.
+fn candidates(problem: &Problem, columns: &Columns<'_>, every: usize) -> Vec<EffectColumns> {
+    let all = library::candidates(problem).unwrap();
+    let chosen = all.iter().enumerate().filter(|(k, member)| k % every == 0 || member.effect.shape.coefficients() > 2);
+    chosen.filter_map(|(_, member)| columns.effect_columns(&member.effect)).collect()
+}
+
+/// The rows of effects: whitened, in fold order.
+fn rows(columns: &Columns<'_>, sets: &[&EffectColumns]) -> Mat<f64> {
+    let mut rows = Mat::zeros(columns.rows(), sets.iter().map(|set| set.count).sum());
+    columns.fill(sets, rows.as_mut());
+    rows
+}
+
+/// Sum of squares of a residual after least squares on columns at unit length, over the rows of some folds.
+fn left(columns: &Columns<'_>, folds: &[usize], parts: &[&Mat<f64>], residual: &[f64]) -> f64 {
+    let rows: Vec<usize> = folds.iter().flat_map(|fold| columns.fold_rows[*fold].clone()).collect();
+    let width = parts.iter().map(|part| part.ncols()).sum();
+    let mut x = Mat::zeros(rows.len(), width);
+    let mut next = 0;
+    for part in parts {
+        for j in 0..part.ncols() {
+            let length = part.col(j).norm_l2();
+            rows.iter().enumerate().for_each(|(i, row)| x[(i, next + j)] = part[(*row, j)] / length);
+        }
+        next += part.ncols();
+    }
+    let y = Mat::from_fn(rows.len(), 1, |i, _| residual[rows[i]]);
+    let solved = x.col_piv_qr().solve_lstsq(&y);
+    (y - x * solved).squared_norm_l2()
+}
+
+/// The gains of candidates beside chosen effects, on all readings and without one fold, are the decreases of the sum of
+/// squares by least squares. So are the gains of effects with tuned numbers.
+#[test]
+fn gains_are_those_of_least_squares() {
+    for ar_coefficients in [&[][..], &[0.5, 0.2][..]] {
+        let (problem, beta) = problem(ar_coefficients);
+        let columns = Columns::new(&problem, &beta);
+        let (model, residual) = model(&columns, &beta);
+        let sets = candidates(&problem, &columns, 97);
+        let rank = model.ncols();
+        let prior = PriorGram { base: Mat::zeros(rank, rank), base_y: vec![0.0; rank] };
+        let gram = Gram::new(&columns, sets.clone(), Arc::new(model.clone()), &residual, prior);
+        let all: Vec<usize> = (0..columns.fold_rows.len()).collect();
+        let without: Vec<usize> = all.iter().copied().filter(|fold| *fold != 5).collect();
+        let few: Vec<usize> = (0..sets.len()).filter(|k| sets[*k].count <= 2).collect();
+        let mut compared = 0;
+        for (folds, chosen) in
+            [(&all, vec![]), (&without, vec![]), (&all, vec![few[10], few[30]]), (&without, vec![few[20]])]
+        {
+            let trained = TrainedModel::new(&gram, &chosen, folds).unwrap();
+            let gains = trained.gains(&|_| true).unwrap();
+            let beside: Vec<Mat<f64>> = chosen.iter().map(|k| rows(&columns, &[&sets[*k]])).collect();
+            let parts: Vec<&Mat<f64>> = std::iter::once(&model).chain(&beside).collect();
+            let before = left(&columns, folds, &parts, &residual);
+            let (square, _) = trained.residual_square();
+            assert!((square / before - 1.0).abs() < 1e-8, "{square} {before}");
+            let tuning = trained.tuning();
+            for (k, set) in sets.iter().enumerate().filter(|(k, set)| set.count <= 40 && !chosen.contains(k)) {
+                let own = rows(&columns, &[set]);
+                // Least squares decides differently about nearly collinear columns.
+                if gains[k].freedom < set.count + set.numbers || own.col_iter().any(|column| column.norm_l2() == 0.0) {
+                    continue;
+                }
+                let with: Vec<&Mat<f64>> = parts.iter().copied().chain([&own]).collect();
+                let gain = before - left(&columns, folds, &with, &residual);
+                let found = gains[k].gain;
+                assert!((found - gain).abs() <= 1e-6 * gain + 1e-7 * before, "{k}: {found} {gain} of {before}");
+                let channel = TunedChannel::of(&columns, &tuning, set);
+                let basis = Mat::from_fn(set.basis.nrows(), set.count, |i, k| f64::from(set.basis[(i, k)]));
+                let again = channel.gain(&channel.effect_of(basis));
+                assert!((found - again).abs() <= 1e-8 * before, "{k}: {found} {again}");
+                compared += 1;
+            }
+        }
+        assert!(compared > 100, "{compared}");
+    }
+}
+
+/// Candidates that come in parts, with null draws that are kept, have the gains and the best null scores of all candidates
+/// together.
+#[test]
+fn candidates_in_parts_have_the_scores_of_all_together() {
+    const DRAWS: usize = 5;
+    let (problem, beta) = problem(&[0.5]);
+    let columns = Columns::new(&problem, &beta);
+    let (model, residual) = model(&columns, &beta);
+    let model = Arc::new(model);
+    let sets = candidates(&problem, &columns, 197);
+    let rank = model.ncols();
+    let prior = || PriorGram { base: Mat::zeros(rank, rank), base_y: vec![0.0; rank] };
+    let draw = |k: usize| -> Vec<f64> { (0..residual.len()).map(|i| ((i * (k + 3) + k) as f64).sin()).collect() };
+    let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
+    let scores = |gram: &Gram<'_>| {
+        let trained = TrainedModel::new(gram, &[], &folds).unwrap();
+        let gains: Vec<f64> = trained.gains(&|_| true).unwrap().into_iter().map(|gain| gain.gain).collect();
+        (gains, trained.null_best(&[], &vec![0.0; gram.candidates()], 1.0).unwrap())
+    };
+    let mut together = Gram::new(&columns, sets.clone(), Arc::clone(&model), &residual, prior());
+    together.take_draws((0..DRAWS).map(draw), false, &|| true).unwrap();
+    let (gains, best) = scores(&together);
+    let mut without = Gram::new(&columns, Vec::new(), model, &residual, prior());
+    without.take_draws((0..DRAWS).map(draw), true, &|| true).unwrap();
+    let (mut in_parts, mut best_in_parts) = (Vec::new(), vec![f64::NEG_INFINITY; DRAWS]);
+    for part in sets.chunks(7) {
+        let mut gram = without.clone();
+        gram.append(part.to_vec());
+        let (gains, best) = scores(&gram);
+        in_parts.extend(gains);
+        best_in_parts.iter_mut().zip(best).for_each(|(a, b)| *a = a.max(b));
+    }
+    assert!(gains.len() > 20 && best.iter().all(|score| *score > 0.0), "{} {best:?}", gains.len());
+    let near =
+        |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-9 * a.abs());
+    assert!(near(&gains, &in_parts) && near(&best, &best_in_parts), "{best:?} {best_in_parts:?}");
+}
+
+/// A circle of 12,000 positions, read twice: its states are shared among several tasks, whose sums add up.
+#[test]
+fn gains_of_a_long_session_are_those_of_least_squares() {
+    const POSITIONS: usize = 12_000;
+    let folder = tempfile::tempdir().unwrap();
+    let mut table = String::from("run,x_mm,y_mm,length_mm\n");
+    for i in 0..2 * POSITIONS {
+        let (sin, cos) = (std::f64::consts::TAU * (i % POSITIONS) as f64 / POSITIONS as f64).sin_cos();
+        // Readings with a harmonic and something like noise.
+        let length = 100.0 + 1e-3 * (3.0 * sin * cos + ((i * i) as f64).sin());
+        writeln!(table, "{},{:.9},{:.9},{length:.9}", 1 + i / POSITIONS, -100.0 * cos, -100.0 * sin).unwrap();
+    }
+    std::fs::write(folder.path().join("circle.csv"), table).unwrap();
+    let text = "[machine]\nchain = \"w b Y X t\"\n[machine.axis.X]\n[machine.axis.Y]\n[instrument]\nkind = \"ballbar\"\n\
+        noise_um = 0.7\n[unknowns]\nerrors = [\"EC0Y\"]\n[[test]]\nname = \"XY\"\ndata = \"circle.csv\"\nbar_mm = 100.0\n\
+        workpiece_ball_mm = [0, 0, 0]\nspindle_ball_mm = [0, 0, 0]\nworkpiece_ball_u_um = [2, 2, 0]\n";
+    let file = folder.path().join("session.toml");
+    std::fs::write(&file, text).unwrap();
+    let (problem, fit) = prepare(&abbe_files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
+    let columns = Columns::new(&problem, &fit.beta);
+    let (model, residual) = model(&columns, &fit.beta);
+    let all = library::candidates(&problem).unwrap();
+    let sets: Vec<EffectColumns> =
+        all.iter().step_by(all.len() / 30).filter_map(|member| columns.effect_columns(&member.effect)).collect();
+    assert!(sets.iter().any(|set| set.channel.states.samples.len() > 4096), "all states in one task");
+    let rank = model.ncols();
+    let prior = PriorGram { base: Mat::zeros(rank, rank), base_y: vec![0.0; rank] };
+    let gram = Gram::new(&columns, sets.clone(), Arc::new(model.clone()), &residual, prior);
+    let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
+    let trained = TrainedModel::new(&gram, &[], &folds).unwrap();
+    let gains = trained.gains(&|_| true).unwrap();
+    let before = left(&columns, &folds, &[&model], &residual);
+    let mut compared = 0;
+    for (set, gain) in sets.iter().zip(&gains).filter(|(set, gain)| gain.freedom >= set.count + set.numbers) {
+        let found = before - left(&columns, &folds, &[&model, &rows(&columns, &[set])], &residual);
+        assert!((gain.gain - found).abs() <= 1e-6 * found + 1e-7 * before, "{} {found} of {before}", gain.gain);
+        compared += 1;
+    }
+    assert!(compared >= 5, "{compared} of {}", sets.len());
+}

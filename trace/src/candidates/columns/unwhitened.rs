@@ -1,0 +1,87 @@
+//! Unwhitened rows of the readings that are not rejected as outliers, block after block.
+
+use abbe_identify::error::IdentifyError;
+use abbe_identify::heldout::FoldKind;
+use abbe_identify::problem::RowBlock;
+use faer::Mat;
+
+use super::{Columns, EffectColumns};
+use crate::paired::Units;
+
+impl Columns<'_> {
+    /// The rows of an effect for the accepted readings of one fold, in mm, unwhitened, block after block.
+    pub fn unwhitened_rows_of_fold(&self, column_set: &EffectColumns, fold: usize) -> Mat<f64> {
+        let of_row = &self.problem.folds.of_row;
+        let mut found: Vec<f64> = Vec::new();
+        for block in &self.blocks {
+            let channels = self.problem.channels(block.test);
+            let is_inside = |i: &usize| of_row[block.test][block.rows.start + i / channels] == fold;
+            let rows: Vec<usize> = self.counting(block).into_iter().filter(is_inside).collect();
+            if !rows.is_empty() {
+                let of_block = self.block_rows(&[column_set], block);
+                rows.iter().for_each(|i| found.extend((0..column_set.count).map(|j| of_block[(*i, j)])));
+            }
+        }
+        let count = column_set.count;
+        Mat::from_fn(found.len() / count.max(1), count, |i, j| found[i * count + j])
+    }
+
+    /// The unwhitened rows of `[J | r]` at given parameter values, block after block.
+    ///
+    /// # Errors
+    /// If the model cannot be evaluated.
+    pub fn unwhitened_model_rows(&self, beta: &[f64]) -> Result<Mat<f64>, IdentifyError> {
+        let values = self.problem.slot_values(beta);
+        let blocks = self.blocks.iter().map(|block| self.problem.rows(&values, block));
+        Ok(self.unwhitened(blocks.collect::<Result<_, _>>()?))
+    }
+
+    /// The fold of each row of [`Columns::unwhitened_model_rows`].
+    pub fn unwhitened_folds(&self) -> Vec<usize> {
+        let fold = |block: &RowBlock, i: usize| {
+            self.problem.folds.of_row[block.test][block.rows.start + i / self.problem.channels(block.test)]
+        };
+        self.blocks.iter().flat_map(|block| self.counting(block).into_iter().map(move |i| fold(block, i))).collect()
+    }
+
+    /// The independent units over which held-out errors are paired. Along runs they are the folds (runs or blocks). Among
+    /// poses they are the blocks of joint space, because one fit predicts a whole block, or the poses if folds are random.
+    /// The rows are those of [`Columns::unwhitened_model_rows`].
+    pub fn unwhitened_units(&self) -> Units {
+        let rows = self.blocks.iter().flat_map(|block| {
+            let channels = self.problem.channels(block.test);
+            let reading = move |i: usize| (block.test, block.rows.start + i / channels);
+            self.counting(block).into_iter().map(reading)
+        });
+        let fold = |test: usize, row: usize| self.problem.folds.of_row[test][row];
+        match self.problem.folds.kind {
+            FoldKind::RandomPoses => Units::of(rows.map(|(test, row)| self.problem.folds.pose_of_row[test][row])),
+            FoldKind::PoseBlocks | FoldKind::Runs | FoldKind::RunGroups | FoldKind::Blocks => {
+                Units::of(rows.map(|(test, row)| fold(test, row))).divided()
+            }
+        }
+    }
+
+    /// The scalar rows of a block whose readings are accepted.
+    fn counting(&self, block: &RowBlock) -> Vec<usize> {
+        let channels = self.problem.channels(block.test);
+        let start = block.rows.start * channels;
+        (0..block.rows.len() * channels).filter(|i| self.problem.counts(block.test, start + i)).collect()
+    }
+
+    /// The accepted rows of all blocks, one block below another.
+    fn unwhitened(&self, blocks: Vec<Mat<f64>>) -> Mat<f64> {
+        let counting: Vec<Vec<usize>> = self.blocks.iter().map(|block| self.counting(block)).collect();
+        let mut rows = Mat::zeros(counting.iter().map(Vec::len).sum(), blocks.first().map_or(0, Mat::ncols));
+        let mut start = 0;
+        for (block, counting) in blocks.iter().zip(&counting) {
+            for (k, i) in counting.iter().enumerate() {
+                for j in 0..block.ncols() {
+                    rows[(start + k, j)] = block[(*i, j)];
+                }
+            }
+            start += counting.len();
+        }
+        rows
+    }
+}

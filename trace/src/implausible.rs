@@ -1,0 +1,102 @@
+//! A trace of a session whose readings contradict it. The trace states the contradiction first. It does not search if
+//! the readings belong to another session. It accepts no effect that only represents a wrong set-up value.
+
+use abbe_identify::error::IdentifyError;
+use abbe_identify::fit::{self, Fit};
+use abbe_identify::plausibility::{self, Plausibility, Pulls};
+use abbe_identify::problem::Problem;
+use abbe_identify::results::{Remainder, TraceResult, TraceVerdict};
+use abbe_model::effect::Effect;
+
+use super::TraceOutcome;
+use super::progress::Progress;
+use super::result::unsearched;
+use crate::freed::{is_another_session, with_set_ups_freed};
+
+/// The contradictions between the readings and a session.
+pub(super) struct Contradicted {
+    plausibility: Plausibility,
+    /// Identifiers of the set-up parameters whose stated values are contradicted.
+    parameters: Vec<String>,
+    /// The problem without the priors of these parameters, and its fit. `None` if no set-up value is contradicted.
+    pub freed: Option<(Problem, Fit)>,
+}
+
+impl Contradicted {
+    /// Examines a fit for contradictions.
+    ///
+    /// # Errors
+    /// If the problem cannot be fitted without the set-up priors.
+    pub fn of(problem: &Problem, fit: &Fit) -> Result<Contradicted, IdentifyError> {
+        let mut contradicted =
+            Contradicted { plausibility: plausibility::examine(problem, fit), parameters: Vec::new(), freed: None };
+        let mut freed = problem.clone();
+        if !contradicted.forbids_search()
+            && let Some((parameters, found)) = with_set_ups_freed(&mut freed, fit)?
+        {
+            contradicted.parameters = parameters;
+            contradicted.freed = Some((freed, found));
+        }
+        Ok(contradicted)
+    }
+
+    /// Tells the caller of contradictions.
+    pub fn report(&self, progress: &dyn Fn(Progress) -> bool) {
+        if !self.plausibility.conflicts.is_empty() {
+            progress(Progress::Contradicted(Box::new(self.plausibility.clone())));
+        }
+    }
+
+    /// Whether the set-up is still contradicted in a model with effects that were found without its priors.
+    ///
+    /// # Errors
+    /// If the model with the effects cannot be fitted.
+    pub fn contradicted_by(&self, problem: &Problem, fitted: &Fit, effects: &[Effect]) -> Result<bool, IdentifyError> {
+        if effects.is_empty() {
+            return Ok(true);
+        }
+        let mut with = problem.clone();
+        for effect in effects {
+            with.add_effect(effect)?;
+        }
+        let mut start = vec![0.0; with.parameters.list.len()];
+        start[..fitted.beta.len()].copy_from_slice(&fitted.beta);
+        let found = fit::fit(&with, Some(&start))?;
+        Ok(!Pulls::of(&with, &found).contradicted().is_empty())
+    }
+
+    /// Whether the readings belong to another session, so that a search has no purpose.
+    pub fn forbids_search(&self) -> bool {
+        is_another_session(&self.plausibility)
+    }
+
+    /// Adds the contradictions to a result, before its other warnings.
+    pub fn add_warnings(&self, result: &mut TraceResult) {
+        let mut warnings = plausibility::warnings(&self.plausibility);
+        if !self.parameters.is_empty() {
+            warnings.push(format!(
+                "the search uses no prior of {}, so that it accepts no effect that only represents a wrong set-up value",
+                self.parameters.join(", ")
+            ));
+        }
+        warnings.append(&mut result.warnings);
+        result.warnings = warnings;
+        result.plausibility = self.plausibility.clone();
+    }
+
+    /// The trace that ends before its search.
+    pub fn outcome_without_search(&self, problem: Problem, fit: Fit) -> Result<TraceOutcome, IdentifyError> {
+        let mut result = TraceResult {
+            verdict: TraceVerdict::Unexplained,
+            remainder: Remainder {
+                structured: true,
+                p_value: 0.0,
+                place: Some("every test: the readings contradict the session; no effect was searched for".to_string()),
+            },
+            residual_before: "the readings contradict the session".to_string(),
+            ..unsearched(&problem, &fit)?
+        };
+        self.add_warnings(&mut result);
+        Ok(TraceOutcome::of_declared(problem, fit, result))
+    }
+}

@@ -1,0 +1,103 @@
+//! Refits all parameters with the found effects, and tests the residual for remaining structure.
+
+use abbe_identify::error::IdentifyError;
+use abbe_identify::fit::{Fit, prepare_with, refit};
+use abbe_identify::noise::NoiseSource;
+use abbe_identify::problem::Problem;
+use abbe_model::effect::Effect;
+
+use super::constants::SINGLE;
+use super::remainder::{self, Structure};
+use super::start::Start;
+use super::state::SearchState;
+use crate::candidates::columns::Columns;
+use crate::trace::null_draw_count;
+use crate::{TraceOptions, null};
+
+/// The refitted model with the selected effects, and the remaining structure.
+pub(super) struct RefittedModel {
+    pub after: Problem,
+    pub after_fit: Fit,
+    pub effects: Vec<Effect>,
+    /// Remaining structure. `None` if the residual of the declared model was not tested either.
+    pub structure: Option<Structure>,
+}
+
+impl RefittedModel {
+    /// Refits with the selected effects of a search. `structure_before` is the structure in the residual of the
+    /// declared model.
+    pub fn of(
+        problem: &Problem,
+        before_fit: &Fit,
+        search: &SearchState<'_>,
+        options: &TraceOptions,
+        structure_before: Option<&Structure>,
+    ) -> Result<RefittedModel, IdentifyError> {
+        search.forget_chosen();
+        let effects: Vec<Effect> = selected_effects(search).cloned().collect();
+        if effects.is_empty() {
+            return Ok(RefittedModel {
+                after: problem.clone(),
+                after_fit: before_fit.clone(),
+                effects,
+                structure: structure_before.cloned(),
+            });
+        }
+        // Noise, outliers and rank are determined anew, as in a fit of a session that declares these effects. The
+        // residual of the declared model contains the effects and overstates the noise.
+        let estimated: Vec<Effect> = effects.iter().cloned().map(Effect::with_estimated_numbers).collect();
+        let (mut after, mut after_fit) = prepare_with(&problem.session, &estimated, options.seed)?;
+        if noise_is_from_residual(problem, &after) {
+            after.noise = problem.noise.clone();
+            after_fit = refit(&mut after, &after_fit)?;
+        }
+        let structure = structure_before
+            .map(|_| structure(&after, &after_fit, options, options.seed.wrapping_add(1), &|| search.should_continue()))
+            .transpose()?;
+        Ok(RefittedModel { after, after_fit, effects, structure })
+    }
+
+    /// Whether this model has the effects that the search selects now, in the same order. Exchanges keep the number of
+    /// effects, so the number alone does not decide.
+    pub fn is_of(&self, search: &SearchState<'_>) -> bool {
+        self.effects.iter().eq(selected_effects(search))
+    }
+
+    /// Whether the residual may have significant structure. An untested residual may.
+    pub fn is_structured(&self) -> bool {
+        self.structure.as_ref().is_none_or(Structure::is_significant)
+    }
+}
+
+/// The effects that a search has selected, in its order.
+fn selected_effects<'s>(search: &'s SearchState<'_>) -> impl Iterator<Item = &'s Effect> {
+    let selected = search.selected().iter();
+    selected.map(|selected| search.effect(selected.candidate))
+}
+
+/// Relative difference of two standard deviations of the noise up to which the model is reported with that of a fit, so
+/// that a fit of the session with the found effects gives the same uncertainties.
+const SAME_NOISE: f64 = 0.1;
+
+/// Whether the search used a noise model from repeats along runs that differs from that of a fit: autocorrelated, or
+/// with another standard deviation.
+fn noise_is_from_residual(search: &Problem, fit: &Problem) -> bool {
+    let (of_search, of_fit) = (&search.noise, &fit.noise);
+    let of_one_size = (of_search.sigma_mm / of_fit.sigma_mm - 1.0).abs() < SAME_NOISE;
+    of_search.source == NoiseSource::Repeats && !(of_search.ar_coefficients.is_empty() && of_one_size)
+}
+
+/// The structure in the residual of a fit.
+pub(super) fn structure(
+    problem: &Problem,
+    fit: &Fit,
+    options: &TraceOptions,
+    seed: u64,
+    should_continue: &(dyn Fn() -> bool + Sync),
+) -> Result<Structure, IdentifyError> {
+    let columns = Columns::new(problem, &fit.beta);
+    let start = Start::of(problem, &columns, fit)?;
+    let count = null_draw_count(options);
+    let draws = null::draws(problem, &columns, &fit.residuals, &start.residual, count, SINGLE, seed);
+    remainder::structure(problem, &columns, &start, draws, should_continue)
+}

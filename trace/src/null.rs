@@ -1,0 +1,415 @@
+//! Readings without structure: the null distribution of the search.
+//!
+//! Along runs, the draws come from the pure error: whitened deviations of repeats from their mean, in blocks with
+//! random signs. The blocks keep the autocorrelation that whitening leaves. The deviations lack the trend of their run,
+//! and with it most of their slow part. Each block therefore gets the trend of white noise back. Otherwise effects that
+//! are constant or slow along a run would exceed the draws too often.
+//!
+//! Without enough repeats the draws are single deviations from the running median, each with a random sign, or Gaussian
+//! noise if there are few. Independent poses have few repeats. For them the residual is drawn with a random sign for
+//! each pose (the wild bootstrap). This keeps the magnitude of each pose and removes every dependence on position.
+//!
+//! The noise model is an estimate. Each draw has a standard deviation and an autocorrelation that differ from the
+//! estimates by their uncertainties.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use abbe_identify::noise::trends::{TERMS, Trends};
+use abbe_identify::noise::{NoiseSource, PureError};
+use abbe_identify::numerics::median;
+use abbe_identify::problem::Problem;
+use rand::{RngExt, SeedableRng};
+use rand_distr::{ChiSquared, Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+
+use super::constants::{MAX_AR_SUM, MIN_POOL, SMOOTHING};
+use super::policy::{NullSource, Policy};
+use crate::candidates::columns::Columns;
+
+/// Null draws, each over the whitened rows in fold order, in blocks of `block` readings. A draw is formed when it is
+/// taken: a hundred thousand readings times two hundred draws are 160 MB.
+pub fn draws<'d>(
+    problem: &'d Problem,
+    columns: &'d Columns<'_>,
+    residuals: &[Vec<f64>],
+    whitened: &'d [f64],
+    count: usize,
+    block: usize,
+    seed: u64,
+) -> impl ExactSizeIterator<Item = Vec<f64>> + Send + use<'d> {
+    let mut generator = Pcg64::seed_from_u64(seed ^ 0x6e75_6c6c);
+    let mut draw: Box<dyn FnMut() -> Vec<f64> + Send + 'd> = if Policy::of(problem).null == NullSource::SignFlips {
+        let pose_of_row = &problem.folds.pose_of_row;
+        let poses: Vec<usize> =
+            columns.origin_of_rows().into_iter().map(|(test, row, _)| pose_of_row[test][row]).collect();
+        Box::new(move || sign_flipped(&poses, whitened, &mut generator))
+    } else {
+        let source = NoiseDraws::of(problem, residuals);
+        Box::new(move || columns.placed(&source.draw(columns.rows(), block, &mut generator)))
+    };
+    (0..count).map(move |_| draw())
+}
+
+/// The residual with a random sign for each pose. `poses` are the poses of the values: the readings of several targets at
+/// one pose have one sign.
+fn sign_flipped(poses: &[usize], whitened: &[f64], generator: &mut Pcg64) -> Vec<f64> {
+    let mut signs: HashMap<usize, f64> = HashMap::new();
+    let flipped = |(pose, value): (&usize, &f64)| *signs.entry(*pose).or_insert_with(|| sign(generator)) * value;
+    poses.iter().zip(whitened).map(flipped).collect()
+}
+
+fn sign(generator: &mut Pcg64) -> f64 {
+    if generator.random::<bool>() { 1.0 } else { -1.0 }
+}
+
+/// Whitened deviations in uninterrupted stretches, and the uncertainty of the noise model.
+struct NoiseDraws {
+    pool: Vec<Stretch>,
+    spectrum: Spectrum,
+    /// Degrees of freedom of the noise variance. `None` if it is not an estimate.
+    freedom: Option<f64>,
+}
+
+/// Whitened deviations of one run, of unit variance.
+#[derive(Default)]
+struct Stretch {
+    values: Vec<f64>,
+    /// The orthonormal terms of the trend that the values lack, at each value. Empty if they lack none.
+    trend: Vec<[f64; TERMS]>,
+    /// Readings have this number of channels, one after another, each with a trend of its own.
+    channels: usize,
+}
+
+/// The autocorrelation that an inaccurate whitening leaves.
+struct Spectrum {
+    /// The AR coefficients with which readings are whitened.
+    found: Vec<f64>,
+    /// The first coefficient that the draws have on average.
+    first: f64,
+    /// Its standard uncertainty.
+    u: f64,
+}
+
+impl NoiseDraws {
+    fn of(problem: &Problem, residuals: &[Vec<f64>]) -> NoiseDraws {
+        let kept = |test: usize, row: usize| !problem.rejected[test][row];
+        let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
+        let of_repeats = pure.freedom >= MIN_POOL;
+        let pool = if of_repeats { pool_of_repeats(problem, &pure) } else { pool_of_residual(problem, residuals) };
+        let found = problem.noise.ar_coefficients.clone();
+        let spectrum = match found.first() {
+            Some(first) => Spectrum { first: *first, u: problem.noise.ar_sum_u, found },
+            // An autocorrelation that is not significant. Deviations in blocks have it; independent draws do not.
+            None => pure.autocorrelation(&problem.tests, kept).map_or_else(Spectrum::white, |estimated| Spectrum {
+                found,
+                first: if of_repeats { 0.0 } else { estimated.of_first_order.max(0.0) },
+                u: estimated.sum_u,
+            }),
+        };
+        let estimated = problem.noise.source == NoiseSource::Repeats;
+        let freedom = estimated.then_some(pure.freedom as f64);
+        NoiseDraws { pool, spectrum, freedom }
+    }
+
+    fn draw(&self, rows: usize, block: usize, generator: &mut Pcg64) -> Vec<f64> {
+        let mut values = self.blocks(rows, block, generator);
+        self.spectrum.give(&mut values, generator);
+        // The variance is an estimate with this relative error.
+        let law = self.freedom.and_then(|freedom| Some((freedom, ChiSquared::new(freedom).ok()?)));
+        if let Some((freedom, law)) = law {
+            let scale = (freedom / law.sample(generator)).sqrt();
+            values.iter_mut().for_each(|value| *value *= scale);
+        }
+        values
+    }
+
+    /// Draws `rows` deviations from the pool in blocks with random signs. Draws Gaussian noise if the pool is too small.
+    fn blocks(&self, rows: usize, block: usize, generator: &mut Pcg64) -> Vec<f64> {
+        let ends: Vec<usize> = (self.pool.iter())
+            .scan(0, |end, stretch| {
+                *end += stretch.values.len();
+                Some(*end)
+            })
+            .collect();
+        let total = ends.last().copied().unwrap_or(0);
+        if total < MIN_POOL {
+            return (0..rows).map(|_| generator.sample(StandardNormal)).collect();
+        }
+        let mut values = Vec::with_capacity(rows + block);
+        while values.len() < rows {
+            // A stretch is chosen with probability proportional to its length, and a start within it uniformly.
+            let place = generator.random_range(0..total);
+            let chosen = ends.partition_point(|end| *end <= place);
+            let stretch = &self.pool[chosen];
+            let start = place - (ends[chosen] - stretch.values.len());
+            stretch.draw(start..(start + block).min(stretch.values.len()), &mut values, generator);
+        }
+        values.truncate(rows);
+        values
+    }
+}
+
+impl Stretch {
+    /// A stretch of white noise without its trend, given by terms at each value that need not be orthonormal.
+    fn without_trend(mut values: Vec<f64>, mut trend: Vec<[f64; TERMS]>, channels: usize) -> Stretch {
+        for channel in 0..channels {
+            let own = || (channel..values.len()).step_by(channels);
+            for term in 0..TERMS {
+                let product = |trend: &[[f64; TERMS]], a: usize, b: usize| -> f64 {
+                    own().map(|i| trend[i][a] * trend[i][b]).sum()
+                };
+                let before = product(&trend, term, term);
+                for other in (0..term).chain(0..term) {
+                    let along = product(&trend, term, other);
+                    own().for_each(|i| trend[i][term] -= along * trend[i][other]);
+                }
+                let square = product(&trend, term, term);
+                let scale = if square > 1e-12 * before { 1.0 / square.sqrt() } else { 0.0 };
+                own().for_each(|i| trend[i][term] *= scale);
+            }
+            for term in 0..TERMS {
+                let own = || (channel..trend.len()).step_by(channels);
+                let along: f64 = own().map(|i| values[i] * trend[i][term]).sum();
+                own().for_each(|i| values[i] -= along * trend[i][term]);
+            }
+        }
+        Stretch { values, trend, channels }
+    }
+
+    /// Draws the values of a range with one sign, and a trend of white noise.
+    fn draw(&self, range: Range<usize>, values: &mut Vec<f64>, generator: &mut Pcg64) {
+        if self.trend.is_empty() {
+            // Without their slow part, neighbours would cancel each other.
+            values.extend(range.map(|i| sign(generator) * self.values[i]));
+            return;
+        }
+        let sign = sign(generator);
+        if range.len() == 1 {
+            let share = self.trend[range.start].iter().map(|q| q * q).sum::<f64>().sqrt();
+            let of_trend: f64 = generator.sample(StandardNormal);
+            values.push(sign * self.values[range.start] + share * of_trend);
+            return;
+        }
+        let coefficients: Vec<[f64; TERMS]> =
+            (0..self.channels).map(|_| std::array::from_fn(|_| generator.sample(StandardNormal))).collect();
+        values.extend(range.map(|i| {
+            let of_trend = self.trend[i].iter().zip(&coefficients[i % self.channels]).map(|(q, z)| q * z);
+            sign * self.values[i] + of_trend.sum::<f64>()
+        }));
+    }
+}
+
+impl Spectrum {
+    fn white() -> Spectrum {
+        Spectrum { found: Vec::new(), first: 0.0, u: 0.0 }
+    }
+
+    /// Gives a draw the spectrum that an inaccurate whitening leaves. Whitening with an inaccurate autocorrelation under-
+    /// or over-whitens. The AR coefficients of each draw differ from the estimate by its uncertainty. With `A` the
+    /// polynomial of the whitening and `A*` that of the draw, `A* w = A ε`.
+    fn give(&self, values: &mut [f64], generator: &mut Pcg64) {
+        if self.first == 0.0 && self.u <= 0.0 {
+            return;
+        }
+        let standard: f64 = generator.sample(StandardNormal);
+        let mut own = self.found.clone();
+        own.resize(own.len().max(1), 0.0);
+        own[0] = self.first;
+        let sum: f64 = own.iter().sum();
+        own[0] += (self.u * standard).clamp(-MAX_AR_SUM - sum, MAX_AR_SUM - sum);
+        // Without whitening the variance of a reading is known, and not that of its innovation.
+        let scale = if self.found.is_empty() { (1.0 - own[0] * own[0]).sqrt() } else { 1.0 };
+        let drawn = values.to_vec();
+        for t in 0..values.len() {
+            let mut value = scale * drawn[t];
+            for (lag, own) in own.iter().enumerate() {
+                if let Some(before) = t.checked_sub(lag + 1) {
+                    let found = self.found.get(lag).copied().unwrap_or(0.0);
+                    value += own * values[before] - found * drawn[before];
+                }
+            }
+            values[t] = value;
+        }
+    }
+}
+
+/// The deviations of repeats of each run, without the trend of the run.
+fn pool_of_repeats(problem: &Problem, pure: &PureError) -> Vec<Stretch> {
+    let mut pool = Vec::new();
+    for (number, test) in problem.tests.iter().enumerate() {
+        let Some(readings) = &test.readings else { continue };
+        let channels = problem.channels(number);
+        let trends = Trends::of(readings, |row| !problem.rejected[number][row]);
+        // The trend is given back, so the deviations are not rescaled for it.
+        let of_scalar = |i: usize| -> Option<[f64; TERMS + 1]> {
+            let (trend, deviation) = (trends.terms_at(i / channels), pure.deviations[number][i]?);
+            Some(std::array::from_fn(|k| *trend.get(k).unwrap_or(&(deviation / pure.rescaling(number)))))
+        };
+        for run in readings.runs() {
+            for stretch in whitened(problem, number, run, of_scalar) {
+                let trend: Vec<[f64; TERMS]> = stretch.iter().map(|row| std::array::from_fn(|k| row[k])).collect();
+                let values = stretch.iter().map(|row| row[TERMS]).collect();
+                pool.push(Stretch::without_trend(values, trend, channels));
+            }
+        }
+    }
+    pool
+}
+
+/// The residual of each run less its running median, at unit variance. The stated noise may differ from the true noise,
+/// and the search uses whitened readings.
+fn pool_of_residual(problem: &Problem, residuals: &[Vec<f64>]) -> Vec<Stretch> {
+    let mut pool = Vec::new();
+    for block in problem.blocks() {
+        let channels = problem.channels(block.test);
+        let first = block.rows.start * channels;
+        let rough = without_smooth(&residuals[block.test][first..block.rows.end * channels], channels);
+        for stretch in whitened(problem, block.test, block.rows, |i| Some([rough[i - first]])) {
+            pool.push(Stretch { values: stretch.into_iter().flatten().collect(), trend: Vec::new(), channels });
+        }
+    }
+    let values = || pool.iter().flat_map(|stretch| &stretch.values);
+    let mean_square = values().map(|value| value * value).sum::<f64>() / values().count().max(1) as f64;
+    if mean_square > 0.0 {
+        let values = pool.iter_mut().flat_map(|stretch| &mut stretch.values);
+        values.for_each(|value| *value /= mean_square.sqrt());
+    }
+    pool
+}
+
+/// Whitens values at the scalar readings of some rows of a test. Returns uninterrupted stretches: a gap is a reading
+/// without values or a rejected one.
+fn whitened<const N: usize>(
+    problem: &Problem,
+    test: usize,
+    rows: Range<usize>,
+    values_at: impl Fn(usize) -> Option<[f64; N]>,
+) -> Vec<Vec<[f64; N]>> {
+    let channels = problem.channels(test);
+    let (ar, innovation) = (&problem.noise.ar_coefficients, problem.noise.innovation_mm());
+    let whitened_at = |i: usize| {
+        let mut now = values_at(i).filter(|_| problem.counts(test, i))?;
+        for (lag, a) in ar.iter().enumerate() {
+            let past = values_at(i - (lag + 1) * channels)?;
+            now.iter_mut().zip(past).for_each(|(now, past)| *now -= a * past);
+        }
+        Some(now.map(|value| value / innovation))
+    };
+    let first = (rows.start + ar.len()) * channels;
+    let values: Vec<Option<[f64; N]>> = (first..rows.end * channels).map(whitened_at).collect();
+    let stretches = values.split(Option::is_none).filter(|stretch| !stretch.is_empty());
+    stretches.map(|stretch| stretch.iter().flatten().copied().collect()).collect()
+}
+
+/// A residual less its running median.
+fn without_smooth(residual: &[f64], channels: usize) -> Vec<f64> {
+    let rows = residual.len() / channels;
+    let mut rough = vec![0.0; residual.len()];
+    for row in 0..rows {
+        let (start, end) = (row.saturating_sub(SMOOTHING), (row + SMOOTHING + 1).min(rows));
+        for channel in 0..channels {
+            let mut window: Vec<f64> = (start..end).map(|r| residual[r * channels + channel]).collect();
+            let level = median(&mut window);
+            rough[row * channels + channel] = residual[row * channels + channel] - level;
+        }
+    }
+    rough
+}
+
+#[cfg(test)]
+mod tests {
+    use abbe_identify::noise::trends::trend_terms;
+
+    use super::*;
+
+    /// Three coordinates rise at their own rates. Nothing of the rise remains away from the ends. The spike remains up
+    /// to the difference of its neighbours.
+    #[test]
+    fn smooth_structure_is_removed_from_each_coordinate() {
+        const ROWS: usize = 60;
+        let (spiked, coordinate) = (30, 1);
+        let residual: Vec<f64> = (0..3 * ROWS)
+            .map(|i| (i / 3) as f64 * [1.0, -2.0, 5.0][i % 3] + if i == 3 * spiked + coordinate { 1e3 } else { 0.0 })
+            .collect();
+        let rough = without_smooth(&residual, 3);
+        assert_eq!(rough.len(), residual.len());
+        for row in SMOOTHING..ROWS - SMOOTHING {
+            for k in 0..3 {
+                let left = rough[3 * row + k];
+                let spike = if (row, k) == (spiked, coordinate) { 1e3 } else { 0.0 };
+                // A spike among an odd number of neighbours moves their median by at most one order statistic.
+                assert!((left - spike).abs() <= 2.0 + 1e-9, "{row} {k}: {left}");
+                if k != coordinate {
+                    assert!(left.abs() < 1e-9);
+                }
+            }
+        }
+    }
+
+    /// Runs of 63 readings that have lost their trend, as pure error has. The sum over a block of 20 draws has the variance
+    /// of 20 independent readings, and so has the difference of neighbours. Without the trend it has less than half.
+    #[test]
+    fn blocks_of_draws_are_white_although_deviations_lack_their_trend() {
+        const RUN: usize = 63;
+        const BLOCK: usize = 20;
+        let mut generator = Pcg64::seed_from_u64(3);
+        let pool: Vec<Stretch> = (0..400)
+            .map(|_| {
+                let noise: Vec<f64> = (0..RUN).map(|_| generator.sample(StandardNormal)).collect();
+                let times: Vec<f64> = (0..RUN).map(|t| t as f64).collect();
+                // Scaled, so that the terms have to be normalised.
+                let trend = trend_terms(&times).into_iter().map(|terms| terms.map(|q| 3.0 * q)).collect();
+                Stretch::without_trend(noise, trend, 1)
+            })
+            .collect();
+        let mut draws = NoiseDraws { pool, spectrum: Spectrum::white(), freedom: None };
+        let variance_of_sums = |draws: &NoiseDraws, generator: &mut Pcg64| {
+            let values = draws.blocks(400_000, BLOCK, generator);
+            let rough = values.windows(2).map(|two| (two[1] - two[0]).powi(2)).sum::<f64>() / (2.0 * 399_999.0);
+            // Blocks at the end of a run are shorter: sums over a tenth of a block see few boundaries.
+            let sums = values.chunks_exact(10).map(|part| part.iter().sum::<f64>().powi(2)).sum::<f64>();
+            (sums / 400_000.0, rough)
+        };
+        let (slow, rough) = variance_of_sums(&draws, &mut generator);
+        assert!((slow - 1.0).abs() < 0.08 && (rough - 1.0).abs() < 0.08, "{slow} {rough}");
+        draws.pool.iter_mut().for_each(|stretch| stretch.trend.iter_mut().for_each(|terms| *terms = [0.0; TERMS]));
+        let (slow, _) = variance_of_sums(&draws, &mut generator);
+        assert!(slow < 0.7, "{slow}");
+    }
+
+    /// The variance of a draw scatters as that of an estimate with so many degrees of freedom, and its autocorrelation by
+    /// its uncertainty.
+    #[test]
+    fn draws_differ_by_the_uncertainty_of_the_noise_model() {
+        const ROWS: usize = 4000;
+        const DRAWS: usize = 400;
+        let mut generator = Pcg64::seed_from_u64(4);
+        let draws = |freedom: Option<f64>, first: f64, u: f64, generator: &mut Pcg64| -> Vec<(f64, f64)> {
+            let spectrum = Spectrum { first, u, ..Spectrum::white() };
+            let source = NoiseDraws { pool: Vec::new(), spectrum, freedom };
+            (0..DRAWS)
+                .map(|_| {
+                    let values = source.draw(ROWS, 1, generator);
+                    let square = values.iter().map(|v| v * v).sum::<f64>();
+                    let neighbours = values.windows(2).map(|two| two[0] * two[1]).sum::<f64>();
+                    (square / ROWS as f64, neighbours / square)
+                })
+                .collect()
+        };
+        let moments = |of: Vec<f64>| {
+            let mean = of.iter().sum::<f64>() / DRAWS as f64;
+            (mean, (of.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / DRAWS as f64).sqrt())
+        };
+        // ν/χ² has the mean ν/(ν − 2) and the variance 2 ν²/((ν − 2)² (ν − 4)).
+        let (mean, scatter) = moments(draws(Some(50.0), 0.0, 0.0, &mut generator).iter().map(|d| d.0).collect());
+        assert!((mean - 50.0 / 48.0).abs() < 0.05, "{mean}");
+        assert!((scatter / (2.0 * 2500.0 / (48.0 * 48.0 * 46.0_f64)).sqrt() - 1.0).abs() < 0.25, "{scatter}");
+        let correlated = draws(None, 0.3, 0.1, &mut generator);
+        let (mean, scatter) = moments(correlated.iter().map(|d| d.1).collect());
+        assert!((mean - 0.3).abs() < 0.03 && (scatter / 0.1 - 1.0).abs() < 0.25, "{mean} {scatter}");
+        // The variance of a reading stays that of the noise.
+        let (mean, _) = moments(correlated.iter().map(|d| d.0).collect());
+        assert!((mean - 1.0).abs() < 0.02, "{mean}");
+    }
+}

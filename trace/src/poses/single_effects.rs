@@ -1,0 +1,250 @@
+//! Single effects beside families, or in their place.
+//!
+//! The candidates of the library are screened by their gain in the residual of the model with the families. The best
+//! are fitted together with the families, which keep their scales. One is added only if its gain is significant among
+//! all candidates with the inflated noise of the families, and if it lowers the held-out error over blocks of joint
+//! space by more than the standard error of the decrease. Of those that fit equally well the simplest is added. A
+//! harmonic of a joint about its own axis frees that order from the prior of its spectrum.
+
+use abbe_identify::error::IdentifyError;
+use abbe_identify::fit::families::FoldEquations;
+use abbe_identify::fit::{Fit, with_families_linearised};
+use abbe_identify::numerics::tails::ln_chi_square_tail;
+use abbe_identify::problem::Problem;
+use abbe_model::driver::Driver;
+
+use super::{AcceptedEffect, PoseModel};
+use crate::candidates::candidate::Candidate;
+use crate::candidates::columns::{Columns, EffectColumns};
+use crate::candidates::gain::TrainedModel;
+use crate::candidates::gram::Gram;
+use crate::candidates::library::{self, Family};
+use crate::constants::{INDISTINGUISHABLE, LINES_TRIED, MAX_IN_PLACE_OF_FAMILIES};
+use crate::interrupt::Interrupt;
+use crate::paired::HeldOutDecrease;
+use crate::plausible::prior_cost;
+use crate::start::Start;
+use crate::{Progress, TraceOptions, screening};
+
+/// The candidates of the library for the declared model.
+pub(super) struct Library<'p> {
+    columns: Columns<'p>,
+    start: Start,
+    candidates: Vec<Candidate>,
+    families: Vec<Family>,
+}
+
+impl<'p> Library<'p> {
+    /// The requested single effects of the library.
+    ///
+    /// # Errors
+    /// If the model cannot be evaluated, or a requested string occurs in no identifier.
+    pub fn of(problem: &'p Problem, fit: &Fit, options: &TraceOptions) -> Result<Library<'p>, IdentifyError> {
+        let columns = Columns::new(problem, &fit.beta);
+        let start = Start::of(problem, &columns, fit)?;
+        let searched = screening::searched_candidates(problem, &columns, options)?;
+        let is_single = |candidate: &Candidate| !candidate.last_resort && !candidate.dictionary;
+        let candidates = searched.into_iter().filter(is_single).collect();
+        Ok(Library { columns, start, candidates, families: library::families()? })
+    }
+
+    /// The candidates with a gain in a residual, the largest evidence first, without those of a model.
+    ///
+    /// # Errors
+    /// If the gains cannot be computed, or [`IdentifyError::Interrupted`].
+    pub fn nearest(
+        &self,
+        model: &PoseModel,
+        residuals: &[Vec<f64>],
+        interrupt: Interrupt<'_>,
+    ) -> Result<Vec<&Candidate>, IdentifyError> {
+        Ok(scored(self, model, residuals, interrupt)?.0.into_iter().map(|(k, _)| &self.candidates[k]).collect())
+    }
+
+    /// Number of candidates.
+    pub fn count(&self) -> usize {
+        self.candidates.len()
+    }
+}
+
+/// How a search for single effects ended.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ended {
+    /// Number of candidates that are observable beside the declared parameters.
+    pub detectable: usize,
+    /// p-value of the best effect that was not added.
+    pub last_p_value: f64,
+}
+
+/// Limits of a search for single effects.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// Maximum number of effects of the model.
+    pub effects: usize,
+    /// Probability that an effect is added to readings without one.
+    pub significance: f64,
+    /// The held-out rms of the model with families, mm, if the single effects are to take the place of families. The search
+    /// ends when it cannot reach this value.
+    pub to_reach_mm: Option<f64>,
+}
+
+/// Adds single effects to a model until none lowers the held-out error, or a limit is reached.
+///
+/// # Errors
+/// If a model cannot be fitted, or [`IdentifyError::Interrupted`]; `found` then holds the effects accepted so far.
+pub(super) fn add(
+    found: &mut PoseModel,
+    library: &Library<'_>,
+    limits: Limits,
+    interrupt: Interrupt<'_>,
+) -> Result<Ended, IdentifyError> {
+    let mut ended = Ended { detectable: 0, last_p_value: 1.0 };
+    let mut added = 0;
+    while found.effects.len() < limits.effects {
+        interrupt.check()?;
+        let ranked = ranked(library, found, interrupt)?;
+        ended.detectable = ranked.detectable;
+        let tried: Vec<&Candidate> = ranked.best.iter().map(|k| &library.candidates[*k]).collect();
+        let (best, last_p_value) = best_of(found, &tried, library.count(), limits.significance, interrupt)?;
+        ended.last_p_value = last_p_value;
+        let Some(best) = best else { break };
+        let before_mm = found.fit.held_out.rms_mm;
+        let mut with = found.problem.clone();
+        with.add_effect(&best.candidate.effect)?;
+        let mut beta = found.fit.beta.clone();
+        beta.resize(with.parameters.list.len(), 0.0);
+        interrupt.check()?;
+        (found.problem, found.fit) = with_families_linearised(with, beta)?;
+        added += 1;
+        let family = library.families.get(best.candidate.family);
+        found.effects.push(AcceptedEffect {
+            effect: best.candidate.effect.clone(),
+            group: family.map(|family| family.name.clone()).unwrap_or_default(),
+            is_single: true,
+            p_value: best.p_value,
+            heldout_rms_mm: best.held_out_mm,
+            aliases: Vec::new(),
+        });
+        let Some(to_reach_mm) = limits.to_reach_mm else {
+            let (id, unit) = (best.candidate.effect.id(), found.problem.unit());
+            (interrupt.0)(Progress::SelectedEffect(found.effects.len(), id, best.held_out_mm * 1e3, unit));
+            continue;
+        };
+        // No later effect lowers the error by more than this one did.
+        let [now, before, least] = [found.fit.held_out.rms_mm, before_mm, to_reach_mm].map(|rms| rms * rms);
+        let further = MAX_IN_PLACE_OF_FAMILIES.saturating_sub(added) as f64;
+        if now - further * (before - now).max(0.0) > least {
+            break;
+        }
+    }
+    Ok(ended)
+}
+
+/// The candidates with the largest gains in the residual, the largest first.
+struct Ranked {
+    best: Vec<usize>,
+    detectable: usize,
+}
+
+fn ranked(library: &Library<'_>, found: &PoseModel, interrupt: Interrupt<'_>) -> Result<Ranked, IdentifyError> {
+    let (scored, detectable) = scored(library, found, &found.fit.residuals, interrupt)?;
+    // One for each component and driver, so that the neighbouring orders of one cause do not take all places.
+    let mut kinds: Vec<(String, Driver)> = Vec::new();
+    let mut is_new = |k: usize| {
+        let effect = &library.candidates[k].effect;
+        let kind = (effect.component.to_string(), effect.driver.clone());
+        let new = !kinds.contains(&kind);
+        kinds.push(kind);
+        new
+    };
+    let best = scored.into_iter().map(|(k, _)| k).filter(|k| is_new(*k)).take(LINES_TRIED).collect();
+    Ok(Ranked { best, detectable })
+}
+
+/// The candidates that are not in a model and their scores in a residual, the largest first, and the number of candidates
+/// that are observable beside the declared parameters.
+fn scored(
+    library: &Library<'_>,
+    found: &PoseModel,
+    residuals: &[Vec<f64>],
+    interrupt: Interrupt<'_>,
+) -> Result<(Vec<(usize, f64)>, usize), IdentifyError> {
+    let Library { columns, start, candidates, .. } = library;
+    let sets: Vec<EffectColumns> = candidates.iter().map(|candidate| candidate.columns.clone()).collect();
+    let residual = columns.whitened_values(residuals);
+    let should_continue = || interrupt.check().is_ok();
+    let gram = Gram::new(columns, sets, start.model.clone(), &residual, start.prior());
+    let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
+    gram.prepare(&[], &should_continue)?;
+    let trained = TrainedModel::new(&gram, &[], &folds)?;
+    let square: f64 = residual.iter().map(|value| value * value).sum();
+    let variance = (square / columns.rows().max(1) as f64).max(f64::MIN_POSITIVE);
+    let gains = trained.gains(&|_| true)?;
+    let chosen: Vec<_> = found.effects.iter().map(|found| &found.effect).collect();
+    let mut scored: Vec<(usize, f64)> = (gains.iter().enumerate())
+        .filter(|(k, gain)| gain.freedom > 0 && !chosen.contains(&&candidates[*k].effect))
+        .map(|(k, gain)| (k, -ln_chi_square_tail(gain.gain / variance, gain.freedom) - candidates[k].cost))
+        .collect();
+    scored.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    Ok((scored, gains.iter().filter(|gain| gain.freedom > 0).count()))
+}
+
+/// A candidate that lowers the held-out error.
+struct Lowering<'c> {
+    candidate: &'c Candidate,
+    /// Probability of a gain as large among all candidates.
+    p_value: f64,
+    /// Held-out rms with it, mm.
+    held_out_mm: f64,
+    /// Decrease of the sum of squares of the held-out residuals.
+    decrease: f64,
+    /// Decrease of χ².
+    gain: f64,
+}
+
+/// The candidate that lowers the held-out error most, by more than the standard error of the decrease, or the simplest of
+/// those that the readings do not tell from it; and the least p-value of the candidates.
+fn best_of<'c>(
+    found: &PoseModel,
+    tried: &[&'c Candidate],
+    candidates: usize,
+    significance: f64,
+    interrupt: Interrupt<'_>,
+) -> Result<(Option<Lowering<'c>>, f64), IdentifyError> {
+    let mut all = found.problem.clone();
+    let present = all.parameters.list.len();
+    let mut own = Vec::new();
+    for candidate in tried {
+        let first = all.parameters.list.len();
+        all.add_effect(&candidate.effect)?;
+        own.push(first..all.parameters.list.len());
+    }
+    let mut beta = found.fit.beta.clone();
+    beta.resize(all.parameters.list.len(), 0.0);
+    let equations = FoldEquations::of(&all, &beta, &all.triangles(&beta)?);
+    interrupt.check()?;
+    let without = equations.with_parameters(&(0..present).collect::<Vec<_>>()).at_present(&all)?;
+    let mut accepted: Vec<Lowering<'c>> = Vec::new();
+    let mut last = 1.0_f64;
+    for (candidate, own) in tried.iter().zip(own) {
+        interrupt.check()?;
+        let parameters: Vec<usize> = (0..present).chain(own).collect();
+        let with = equations.with_parameters(&parameters).at_present(&all)?;
+        let decrease = HeldOutDecrease::of_scales(&without, &with);
+        // The best of all candidates, by the bound of Bonferroni.
+        let gain = (with.explained() - without.explained()).max(0.0);
+        let tail = ln_chi_square_tail(gain, candidate.columns.count);
+        let p_value = (tail + (candidates as f64).ln()).min(0.0).exp();
+        last = last.min(p_value);
+        if p_value <= significance && decrease.is_significant() {
+            let held_out_mm = (with.held_out_sum() / equations.readings()).sqrt() * all.noise.likelihood_mm();
+            accepted.push(Lowering { candidate, p_value, held_out_mm, decrease: decrease.by, gain });
+        }
+    }
+    let lowest = accepted.iter().max_by(|a, b| a.decrease.total_cmp(&b.decrease));
+    let least_gain = lowest.map_or(0.0, |best| best.gain - 2.0 * INDISTINGUISHABLE);
+    let length = |one: &Lowering<'_>| prior_cost(&one.candidate.effect) + one.candidate.description_length();
+    let equal = accepted.into_iter().filter(|one| one.gain >= least_gain);
+    let simplest = equal.min_by(|a, b| length(a).total_cmp(&length(b)).then(b.decrease.total_cmp(&a.decrease)));
+    Ok((simplest, last))
+}

@@ -1,0 +1,229 @@
+//! Results of a found effect: name, numbers of the shape, parameters, curve.
+
+use abbe_identify::error::IdentifyError;
+use abbe_identify::fit::Fit;
+use abbe_identify::parameters::{Parameter, Role};
+use abbe_identify::problem::Problem;
+use abbe_identify::results::{
+    AliasResult, EffectName, EffectResult, LargestOrder, ParameterResult, PriorResult, ShapeParameter,
+};
+use abbe_model::chain::Machine;
+use abbe_model::effect::description::{explanations, meaning};
+use abbe_model::effect::{Effect, Shape};
+use abbe_model::session::Prior;
+use faer::Mat;
+
+use super::curve::{curve_of, curve_units};
+use super::prediction::Predictions;
+use super::steps;
+use super::{HeldOut, TraceFindings};
+use crate::candidates::library::Family;
+
+/// Largest exponent of a likelihood ratio that is a finite number.
+const LARGEST_EXPONENT: f64 = 700.0;
+
+/// The name of an effect in results.
+pub fn effect_name(machine: &Machine, effect: &Effect) -> EffectName {
+    EffectName {
+        component: effect.component.to_string(),
+        driver: effect.driver.to_string(),
+        shape: effect.shape.word().to_string(),
+        order: effect.shape.order(),
+        tests: effect.tests.clone(),
+        meaning: meaning(machine, effect).to_string(),
+    }
+}
+
+/// A found effect with the results that its report needs.
+pub(super) struct Found<'f> {
+    /// Index among the found effects.
+    pub number: usize,
+    /// Its candidate.
+    pub candidate: usize,
+    /// The model with the found effects and their aliases.
+    pub after: &'f Problem,
+    /// Its fit.
+    pub after_fit: &'f Fit,
+    /// All parameters after the search; their `u` cover the changes by aliases.
+    pub parameters: &'f [ParameterResult],
+    /// Decrease of the residual by the effect, µm.
+    pub rms_gain_um: f64,
+    /// The effects with which it is confounded.
+    pub alias_effects: &'f [Effect],
+    /// Increase of χ² and of the prior cost by each of these in its place.
+    pub costs: &'f [[f64; 2]],
+    /// The left-out tests that the effect and its aliases predict.
+    pub predicted: &'f Predictions,
+}
+
+/// The results of a found effect.
+pub(super) fn result(
+    findings: &TraceFindings<'_>,
+    families: &[Family],
+    held_out: &HeldOut<'_>,
+    found: &Found<'_>,
+) -> Result<EffectResult, IdentifyError> {
+    let (after, search) = (found.after, findings.search);
+    let taken = search.selected()[found.number];
+    let candidate = &search.candidates[found.candidate];
+    let number = found.number + findings.before.parameters.effects.len();
+    let described = described(after, found.after_fit, number, found.parameters)?;
+    let aliases: Vec<&Effect> = found.alias_effects.iter().collect();
+    Ok(EffectResult {
+        family: families.get(candidate.family).map(|family| family.name.clone()).unwrap_or_default(),
+        p_value: taken.p_value,
+        rms_gain_um: found.rms_gain_um,
+        heldout_rms_um: held_out.um(found.number + 1),
+        left_out_test_rms_um: found.predicted.found_um,
+        aliases_left_out_test_rms_um: match found.predicted.found_um {
+            Some(_) => found.predicted.aliases_um.clone(),
+            None => Vec::new(),
+        },
+        ..explained_by(described, after, &candidate.effect, &aliases, found.costs)
+    })
+}
+
+/// The result of an effect with its aliases. `costs` are the increases of χ² and of the prior cost by each of these in its
+/// place.
+pub(super) fn explained_by(
+    of_effect: EffectResult,
+    problem: &Problem,
+    effect: &Effect,
+    aliases: &[&Effect],
+    costs: &[[f64; 2]],
+) -> EffectResult {
+    let machine = &problem.session.machine;
+    let alike = std::iter::once(effect).chain(aliases.iter().copied());
+    let meanings: Vec<_> = alike.map(|effect| meaning(machine, effect)).collect();
+    let ratio = |logarithm: f64| logarithm.min(LARGEST_EXPONENT).exp();
+    let alias = |(effect, [delta_chi2, prior_cost]): (&&Effect, &[f64; 2])| AliasResult {
+        name: effect_name(machine, effect),
+        shape_parameters: shape_parameters_of(problem, effect, &[]),
+        delta_chi2: *delta_chi2,
+        likelihood_ratio: ratio(-0.5 * delta_chi2),
+        prior_cost: *prior_cost,
+        probability_ratio: ratio(-0.5 * delta_chi2 - prior_cost),
+    };
+    EffectResult {
+        unique: aliases.is_empty(),
+        explanation_count: meanings.len(),
+        explanations: explanations(&meanings),
+        aliases: aliases.iter().zip(costs).map(alias).collect(),
+        ..of_effect
+    }
+}
+
+/// The `number`-th effect of a fitted problem without the results of a search: name, numbers, parameters, prior, curve.
+///
+/// # Errors
+/// If the model cannot be evaluated.
+pub(super) fn described(
+    problem: &Problem,
+    fit: &Fit,
+    number: usize,
+    parameters: &[ParameterResult],
+) -> Result<EffectResult, IdentifyError> {
+    let (machine, effect) = (&problem.session.machine, &problem.parameters.effects[number]);
+    let (curve_at_unit, curve_unit) = curve_units(problem, effect);
+    let meaning = meaning(machine, effect);
+    let intervals = steps::intervals(problem, fit, number)?;
+    Ok(EffectResult {
+        reading_unit: problem.unit(),
+        name: effect_name(machine, effect),
+        family: String::new(),
+        shape_parameters: shape_parameters_of(problem, effect, &intervals),
+        parameters: parameters_of(problem, parameters, number),
+        prior: prior_of(problem, fit, number),
+        curve: curve_of(problem, fit, number),
+        curve_at_unit,
+        curve_unit,
+        p_value: 1.0,
+        rms_gain_um: 0.0,
+        heldout_rms_um: 0.0,
+        unique: true,
+        explanation_count: 1,
+        explanations: explanations(&[meaning]),
+        aliases: Vec::new(),
+        left_out_test_rms_um: None,
+        aliases_left_out_test_rms_um: Vec::new(),
+        separated_by: None,
+        separation: None,
+        separating_tests: Vec::new(),
+    })
+}
+
+/// The prior of the coefficients of the `number`-th effect; `None` without one.
+fn prior_of(problem: &Problem, fit: &Fit, number: usize) -> Option<PriorResult> {
+    let own = |parameter: &&Parameter| matches!(parameter.role, Role::Coefficient { effect, .. } if effect == number);
+    let first = problem.parameters.list.iter().find(own)?;
+    let Prior::Gaussian(scale) = first.prior else { return None };
+    let effect = &problem.parameters.effects[number];
+    Some(PriorResult {
+        scale: scale * first.unit.display_per_internal,
+        unit: first.unit.name.clone(),
+        family: effect.family(),
+        effective_parameters: effective_parameters(problem, &fit.covariance, number)?,
+        coefficients: effect.shape.coefficients(),
+        largest_order: largest_order(problem, fit, number),
+    })
+}
+
+/// The order of a spectrum with the largest amplitude; `None` for other shapes and for a single order.
+fn largest_order(problem: &Problem, fit: &Fit, number: usize) -> Option<LargestOrder> {
+    let Shape::Spectrum(spectrum) = problem.parameters.effects[number].shape else { return None };
+    let own = |parameter: &Parameter| matches!(parameter.role, Role::Coefficient { effect, .. } if effect == number);
+    let first = problem.parameters.list.iter().position(own)?;
+    let display = problem.parameters.list[first].unit.display_per_internal;
+    let squares: Vec<f64> =
+        (0..spectrum.orders).map(|k| fit.beta[first + 2 * k].powi(2) + fit.beta[first + 2 * k + 1].powi(2)).collect();
+    let (place, largest) = squares.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let mean = (squares.iter().sum::<f64>() - largest) / spectrum.orders.checked_sub(1)? as f64;
+    if mean <= 0.0 {
+        return None;
+    }
+    let below = 1.0 - (-largest / mean).exp();
+    Some(LargestOrder {
+        order: place + 1,
+        amplitude: largest.sqrt() * display,
+        p_value: 1.0 - below.powi(spectrum.orders as i32),
+    })
+}
+
+/// The parameters of the `number`-th effect.
+fn parameters_of(problem: &Problem, parameters: &[ParameterResult], number: usize) -> Vec<ParameterResult> {
+    let Some(id) = problem.parameters.effect_ids.get(number) else {
+        return Vec::new();
+    };
+    let is_own = |p: &&ParameterResult| {
+        p.id.strip_prefix(id.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+    };
+    parameters.iter().filter(is_own).cloned().collect()
+}
+
+/// The numbers and positions of the shape of an effect, with the intervals of the positions.
+fn shape_parameters_of(problem: &Problem, effect: &Effect, of_positions: &[Option<[f64; 2]>]) -> Vec<ShapeParameter> {
+    let unit = effect.driver_unit(&problem.session.machine);
+    let number = |(name, values): (&str, Vec<f64>)| ShapeParameter {
+        name: name.to_string(),
+        values: values.into_iter().map(|value| unit.to_display(value)).collect(),
+        intervals_95: of_positions.iter().map(|ends| ends.map(|ends| ends.map(|end| unit.to_display(end)))).collect(),
+        // The number of a lag is its time constant.
+        unit: if effect.shape.lag_s().is_some() { "s" } else { unit.result }.to_string(),
+    };
+    effect.shape.reported().into_iter().map(number).collect()
+}
+
+/// Effective number of parameters of an effect with a prior: `m − Σ C_jj/τ²`. `None` for an effect without one.
+fn effective_parameters(problem: &Problem, covariance: &Mat<f64>, effect: usize) -> Option<f64> {
+    let mut effective = 0.0;
+    for (j, parameter) in problem.parameters.list.iter().enumerate() {
+        match (parameter.role, parameter.prior) {
+            (Role::Coefficient { effect: of, .. }, Prior::Gaussian(scale)) if of == effect => {
+                effective += 1.0 - (covariance[(j, j)] / (scale * scale)).min(1.0);
+            }
+            (Role::Coefficient { effect: of, .. }, _) if of == effect => return None,
+            _ => {}
+        }
+    }
+    Some(effective)
+}

@@ -1,0 +1,364 @@
+//! Results of a finished search.
+
+mod curve;
+mod effect;
+mod poses;
+mod prediction;
+mod rejected;
+mod steps;
+mod unsearched;
+mod verdict;
+
+use abbe_identify::error::IdentifyError;
+use abbe_identify::fit::outcome::{self, Determined};
+use abbe_identify::fit::{self, Fit, prepare_with};
+use abbe_identify::heldout::cross_validation;
+use abbe_identify::heldout::mislabelled_runs;
+use abbe_identify::noise;
+use abbe_identify::plausibility::Plausibility;
+use abbe_identify::problem::Problem;
+use abbe_identify::results::{ChangedParameter, EffectResult, ModelResult, OfAngles, ParameterResult, TraceResult};
+use abbe_model::effect::Effect;
+
+use super::alias::{self, Alias, CompetingEffect};
+use super::remainder::Structure;
+use super::state::SearchState;
+use crate::candidates::library;
+pub use effect::effect_name;
+pub(super) use poses::{PosesEnded, outcome_of_poses};
+pub(super) use unsearched::unsearched;
+use verdict::{not_examined, verdict};
+
+/// The end state of a search.
+pub(super) struct TraceFindings<'f> {
+    pub before: &'f Problem,
+    pub before_fit: &'f Fit,
+    pub after: &'f Problem,
+    pub after_fit: &'f Fit,
+    pub search: &'f SearchState<'f>,
+    /// Explanations that the user accepts.
+    pub assume: &'f [String],
+    /// Seed of the folds.
+    pub seed: u64,
+    pub structure_before: Option<&'f Structure>,
+    pub structure_after: Option<&'f Structure>,
+    pub last_p_value: f64,
+    /// Whether the search was ended by its cap or by an interruption, not by the evidence.
+    pub stopped_early: bool,
+    /// Whether it was interrupted.
+    pub interrupted: bool,
+    pub candidates: usize,
+    pub candidates_seen: usize,
+}
+
+/// The result, with the data that reports need.
+pub(super) struct ReportedEffect {
+    pub after: Problem,
+    pub after_fit: Fit,
+    pub result: TraceResult,
+    pub alias_effects: Vec<Vec<Effect>>,
+    pub competing_effects: Vec<Vec<CompetingEffect>>,
+}
+
+/// The result, and for each effect its aliases and the best competing effects.
+pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, IdentifyError> {
+    let TraceFindings { before, before_fit, search, .. } = findings;
+    let before_result = before_result(findings)?;
+    let held_out = HeldOut::of(search, before_result.heldout_rms_um);
+    let mut alias_effects: Vec<Vec<Effect>> = Vec::new();
+    let mut competing_effects = Vec::new();
+    let mut gains = Vec::new();
+    let mut chosen_candidates = Vec::new();
+    let mut predicted = Vec::new();
+    let mut costs = Vec::new();
+    let variance = residual_variance(findings);
+    for (k, taken) in search.selected().iter().enumerate() {
+        let model = search.model_without(Some(k))?;
+        let (mut aliases, of_effect) = alias::aliases(search, k, &model, variance)?;
+        let mut of_tests = prediction::predictions(findings, k, &mut aliases)?;
+        competing_effects.push(of_effect);
+        let chosen = assumed(findings, taken.candidate, &mut aliases);
+        if chosen.is_some_and(|candidate| candidate != taken.candidate) {
+            // The left-out tests were predicted with the other effect in the model.
+            of_tests = prediction::Predictions::none(&aliases);
+        }
+        predicted.push(of_tests);
+        chosen_candidates.push((chosen.unwrap_or(taken.candidate), chosen.is_some()));
+        let effect_of = |alias: &Alias| search.effect(alias.candidate).clone();
+        alias_effects.push(aliases.iter().map(effect_of).collect());
+        costs.push(aliases.iter().map(|alias| [alias.delta_chi2, alias.prior_cost]).collect::<Vec<_>>());
+        gains.push(model.gain(taken.candidate)?.gain);
+    }
+    let (after, after_fit) = with_aliases(findings, &chosen_candidates, &alias_effects)?;
+    let (after, after_fit) = (&after, &after_fit);
+    let mut after_result = model_result(after, after_fit, held_out.last_um() * 1e-3)?;
+    let (verdict, remainder) = verdict(findings, !search.selected().is_empty());
+    let determined = Determined::of(after, &after_fit.rank)?;
+    let goodness = after_result.goodness.with_structure(remainder.structured);
+    after_result.goodness = goodness;
+    determined.mark(after, &mut after_result.parameters, goodness);
+    let families = library::families()?;
+    let effects: Vec<EffectResult> = (0..alias_effects.len())
+        .map(|k| {
+            let reported = effect::Found {
+                number: k,
+                candidate: chosen_candidates[k].0,
+                after,
+                after_fit,
+                parameters: &after_result.parameters,
+                rms_gain_um: (gains[k] / held_out.rows).sqrt() * before.noise.sigma_mm * 1e3,
+                alias_effects: &alias_effects[k],
+                costs: &costs[k],
+                predicted: &predicted[k],
+            };
+            effect::result(findings, &families, &held_out, &reported)
+        })
+        .collect::<Result<_, _>>()?;
+    let mut warnings = before.session.warnings.clone();
+    warnings.extend(noise::stated_against_repeats(before, &before_fit.residuals));
+    warnings.extend(mislabelled_runs(&before.tests));
+    warnings.extend(fit::assumptions(after));
+    warnings.extend(not_assumed(findings, after));
+    let changed_parameters = changed_parameters(&before_result.parameters, &after_result.parameters);
+    let unique = effects.iter().all(|effect| effect.unique);
+    let mut result = TraceResult {
+        reading_unit: after.unit(),
+        verdict: verdict.gated(goodness.verdict),
+        outcome: outcome::outcome(after, after_fit, goodness, &determined),
+        interrupted: false,
+        time_limit_s: None,
+        unique,
+        noise_um: after.noise.sigma_mm * 1e3,
+        noise_source: after.noise.source,
+        noise_ar_coefficients: after.noise.ar_coefficients.clone(),
+        readings: after.readings(),
+        heldout_by: before.folds.kind.words().to_string(),
+        before: before_result,
+        after: after_result,
+        effects,
+        remainder,
+        residual_before: residual_before(before, findings.structure_before, !search.selected().is_empty()),
+        rejected_candidates: rejected::candidates(&before.session.machine, search, &held_out),
+        changed_parameters,
+        candidates: findings.candidates,
+        candidates_detectable: findings.candidates_seen,
+        unobservable: fit::unobservable(after, &after_fit.rank),
+        null_space: fit::null_space(after, &after_fit.rank),
+        outliers: fit::outliers(after, after_fit),
+        conformity: None,
+        plausibility: Plausibility::default(),
+        warnings,
+        about: before.session.about.iter().cloned().collect(),
+    };
+    if findings.interrupted {
+        result.mark_interrupted();
+    }
+    let (after, after_fit) = (after.clone(), after_fit.clone());
+    Ok(ReportedEffect { after, after_fit, result, alias_effects, competing_effects })
+}
+
+/// The structure of the residual of the declared model, in words.
+fn residual_before(before: &Problem, structure: Option<&Structure>, found: bool) -> String {
+    let words = match structure {
+        Some(structure) if structure.is_significant() => return structure.description.clone(),
+        Some(_) if before.folds.kind.is_poses() => "neighbouring poses do not deviate alike",
+        // Detectors examine one test at a time; the search sums the evidence of all tests for one effect.
+        Some(_) if found => "structure that no single test shows beyond noise; the search over all tests finds it",
+        Some(_) => "no structure beyond noise",
+        None => "not tested: too few poses",
+    };
+    words.to_string()
+}
+
+/// Held-out errors in µm. The held-out error of the declared model converts whitened sums of squares to µm.
+struct HeldOut<'s> {
+    sums: &'s [f64],
+    /// Whitened rows.
+    rows: f64,
+    scale_um: f64,
+}
+
+impl<'s> HeldOut<'s> {
+    fn of(search: &'s SearchState<'_>, before_um: f64) -> HeldOut<'s> {
+        let rows = search.columns.rows().max(1) as f64;
+        let first = search.selection.held_out.first().copied().unwrap_or(1.0);
+        HeldOut {
+            sums: &search.selection.held_out,
+            rows,
+            scale_um: before_um / (first / rows).sqrt().max(f64::MIN_POSITIVE),
+        }
+    }
+
+    /// With this number of effects.
+    fn um(&self, effects: usize) -> f64 {
+        let sum = self.sums.get(effects).or(self.sums.last());
+        (sum.copied().unwrap_or(1.0) / self.rows).sqrt() * self.scale_um
+    }
+
+    fn last_um(&self) -> f64 {
+        self.um(self.sums.len())
+    }
+}
+
+/// Variance for the comparison of aliases, relative to that of the noise. For poses it is that of the remaining
+/// residual.
+fn residual_variance(findings: &TraceFindings<'_>) -> f64 {
+    if !findings.search.policy.in_residual_variance {
+        return 1.0;
+    }
+    let residuals = findings.after_fit.residuals.iter().flatten();
+    // The evidence uses the noise of the search.
+    let sigma_mm = findings.before.noise.sigma_mm;
+    let sum: f64 = residuals.map(|v| (v / sigma_mm).powi(2)).sum();
+    (sum / findings.search.columns.rows().max(1) as f64).max(1.0)
+}
+
+/// The declared model, on the readings that are not excluded after the search.
+fn before_result(findings: &TraceFindings<'_>) -> Result<ModelResult, IdentifyError> {
+    let (before, fit, after) = (findings.before, findings.before_fit, findings.after);
+    let result = model_result(before, fit, fit.held_out.rms_mm)?;
+    if before.rejected == after.rejected {
+        return Ok(result);
+    }
+    let (rms, held_out, of_angles) = fit::rms_of_units(after, &fit.residuals, &fit.held_out.residuals);
+    let [rms_um, heldout_rms_um] = [rms, held_out].map(|mm| mm * 1e3);
+    let in_3d = |rms: f64| result.rms_3d_um.map(|_| rms * 3.0_f64.sqrt());
+    let cross_validation = cross_validation(before, fit, heldout_rms_um * 1e-3, after)?;
+    Ok(ModelResult {
+        rms_um,
+        heldout_rms_um,
+        of_angles,
+        rms_3d_um: in_3d(rms_um),
+        heldout_rms_3d_um: in_3d(heldout_rms_um),
+        cross_validation,
+        ..result
+    })
+}
+
+pub(super) fn model_result(problem: &Problem, fit: &Fit, held_out_mm: f64) -> Result<ModelResult, IdentifyError> {
+    let vectors = problem.are_vectors();
+    let (rms, held, of_angles) = fit::rms_of_units(problem, &fit.residuals, &fit.held_out.residuals);
+    // Of lengths and angles: each part of the held-out error of the search in the proportion of the last fit.
+    let held = if of_angles.is_some() { held * held_out_mm / fit.held_out.rms_mm } else { held_out_mm };
+    let of_angles = of_angles.map(|angles| OfAngles {
+        heldout_rms_arcsec: angles.heldout_rms_arcsec * held_out_mm / fit.held_out.rms_mm,
+        ..angles
+    });
+    let [rms, held] = [rms, held].map(|mm| mm * 1e3);
+    let in_3d = |rms: f64| vectors.then(|| rms * 3.0_f64.sqrt());
+    let goodness = outcome::goodness(problem, fit);
+    let mut parameters = fit::parameters(problem, fit);
+    Determined::of(problem, &fit.rank)?.mark(problem, &mut parameters, goodness);
+    Ok(ModelResult {
+        reading_unit: problem.unit(),
+        of_angles,
+        cross_validation: cross_validation(problem, fit, held * 1e-3, problem)?,
+        rms_um: rms,
+        heldout_rms_um: held,
+        rms_3d_um: in_3d(rms),
+        heldout_rms_3d_um: in_3d(held),
+        noise_um: problem.noise.sigma_mm * 1e3,
+        rank: fit.rank.identifiable_basis.ncols(),
+        parameter_count: fit.beta.len(),
+        chi_square: fit.chi_square,
+        degrees_of_freedom: fit.degrees_of_freedom,
+        goodness,
+        identifiable: fit::ids(&parameters),
+        covariance: fit::covariance_of_parameters(problem, fit, &parameters),
+        parameters,
+    })
+}
+
+/// Warnings about explanations that the user accepts and that explain no effect.
+fn not_assumed(findings: &TraceFindings<'_>, after: &Problem) -> Vec<String> {
+    let assumed: Vec<String> = after.parameters.effects.iter().filter(|one| one.assumed).map(Effect::id).collect();
+    let open = findings.assume.iter().filter(|id| !assumed.contains(id));
+    open.map(|id| format!("\"{id}\" is not assumed: no effect that was found is explained by it")).collect()
+}
+
+/// The candidate that the user accepts as the explanation of an effect; `None` if it is none of these. If it is an alias,
+/// the found effect takes its place among the aliases.
+fn assumed(findings: &TraceFindings<'_>, found: usize, aliases: &mut Vec<Alias>) -> Option<usize> {
+    let id = |candidate: usize| findings.search.effect(candidate).id();
+    if findings.assume.contains(&id(found)) {
+        return Some(found);
+    }
+    let place = aliases.iter().position(|alias| findings.assume.contains(&id(alias.candidate)))?;
+    let chosen = aliases.remove(place);
+    for alias in aliases.iter_mut() {
+        alias.delta_chi2 -= chosen.delta_chi2;
+        alias.prior_cost -= chosen.prior_cost;
+    }
+    let replaced =
+        Alias { candidate: found, delta_chi2: -chosen.delta_chi2, prior_cost: -chosen.prior_cost, ..chosen.clone() };
+    aliases.insert(0, replaced);
+    Some(chosen.candidate)
+}
+
+/// The model with the found effects, which now have their aliases: uncertainties cover these, unless the effect is
+/// assumed. `chosen` is the candidate of each effect, and whether the user accepts it.
+///
+/// # Errors
+/// If an alias cannot be evaluated, or the model with an accepted alias cannot be fitted.
+fn with_aliases(
+    findings: &TraceFindings<'_>,
+    chosen: &[(usize, bool)],
+    alias_effects: &[Vec<Effect>],
+) -> Result<(Problem, Fit), IdentifyError> {
+    let search = findings.search;
+    let effects: Vec<Effect> = (chosen.iter().zip(alias_effects))
+        .map(|((candidate, assumed), aliases)| Effect {
+            aliases: aliases.clone(),
+            assumed: *assumed,
+            ..search.effect(*candidate).clone().with_estimated_numbers()
+        })
+        .collect();
+    let as_found = search.selected().iter().zip(chosen).all(|(found, chosen)| found.candidate == chosen.0);
+    if !as_found {
+        let (mut after, mut fitted) = prepare_with(&findings.before.session, &effects, findings.seed)?;
+        if after.noise != findings.after.noise {
+            after.noise = findings.after.noise.clone();
+            fitted = fit::refit(&mut after, &fitted)?;
+        }
+        return Ok((after, fitted));
+    }
+    let (mut after, mut fitted) = (findings.after.clone(), findings.after_fit.clone());
+    let declared = findings.before.parameters.effects.len();
+    for (own, found) in after.parameters.effects[declared..].iter_mut().zip(effects) {
+        // The numbers of its shape have been estimated.
+        *own = Effect { shape: own.shape.clone(), ..found };
+    }
+    fitted.aliases = fit::aliases_at_solution(&after, &fitted.beta)?;
+    Ok((after, fitted))
+}
+
+/// Parameters that changed by more than their standard uncertainty.
+fn changed_parameters(before: &[ParameterResult], after: &[ParameterResult]) -> Vec<ChangedParameter> {
+    before
+        .iter()
+        .filter_map(|b| {
+            let a = after.iter().find(|a| a.id == b.id)?;
+            ((a.value - b.value).abs() > a.u).then(|| ChangedParameter {
+                id: a.id.clone(),
+                change: a.value - b.value,
+                u: a.u,
+                unit: a.unit.clone(),
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_that_change_by_more_than_their_uncertainty_are_listed() {
+        let parameter = |id: &str, value: f64, u: f64| ParameterResult::new(id, value, u, "um");
+        let before = [parameter("EX0C", 3.0, 0.1), parameter("EY0C", 3.0, 0.1), parameter("EZ0A", 1.0, 0.1)];
+        let after = [parameter("EX0C", 1.0, 1.5), parameter("EY0C", 1.0, 2.5)];
+        let changed = changed_parameters(&before, &after);
+        assert_eq!(changed.len(), 1);
+        assert_eq!((changed[0].id.as_str(), changed[0].change, changed[0].u), ("EX0C", -2.0, 1.5));
+    }
+}

@@ -1,0 +1,121 @@
+//! Result of a search on independent poses that accepted families of effects.
+
+use abbe_identify::error::IdentifyError;
+use abbe_identify::fit::Fit;
+use abbe_identify::fit::outcome::Determined;
+use abbe_identify::parameters::Role;
+use abbe_identify::problem::Problem;
+use abbe_identify::results::{EffectResult, TraceResult};
+use abbe_model::effect::Effect;
+use faer::prelude::Solve;
+use faer::{Mat, Side};
+
+use super::effect::{described, explained_by};
+use super::unsearched::unsearched_of;
+use super::verdict::of_poses;
+use super::{changed_parameters, model_result, residual_before};
+use crate::poses::{AcceptedEffect, PoseModel, PoseSearch};
+use crate::remainder::Structure;
+use crate::{SearchStep, TraceOutcome};
+
+/// How a search with families ended.
+pub(crate) struct PosesEnded {
+    /// Whether the maximum number of effects ended the search.
+    pub stopped_early: bool,
+    /// Structure in the residuals of the declared and of the last model; `None` if there are too few poses for the test.
+    pub structures: [Option<Structure>; 2],
+    /// Warnings about the options.
+    pub warnings: Vec<String>,
+}
+
+/// The outcome of a search that accepted families: the declared model, and the model with the found effects. The aliases
+/// of a family are not examined: it is the error of each joint about its own axis, as a whole.
+///
+/// # Errors
+/// If the model cannot be evaluated for the cross-validation.
+pub(crate) fn outcome_of_poses(
+    before: &Problem,
+    before_fit: &Fit,
+    found: PoseSearch,
+    ended: PosesEnded,
+) -> Result<TraceOutcome, IdentifyError> {
+    let PoseModel { problem: after, fit: after_fit, effects: accepted, proposed } = found.model;
+    let before_result = model_result(before, before_fit, before_fit.held_out.rms_mm)?;
+    let mut after_result = model_result(&after, &after_fit, after_fit.held_out.rms_mm)?;
+    let [structure_before, structure_after] = ended.structures;
+    let (verdict, remainder) = of_poses(true, ended.stopped_early, structure_after.as_ref(), found.last_p_value);
+    after_result.goodness = after_result.goodness.with_structure(remainder.structured);
+    Determined::of(&after, &after_fit.rank)?.mark(&after, &mut after_result.parameters, after_result.goodness);
+    let declared = before.parameters.effects.len();
+    let effects: Vec<EffectResult> = (accepted.iter().enumerate())
+        .map(|(k, accepted)| {
+            let described = described(&after, &after_fit, declared + k, &after_result.parameters)?;
+            Ok(EffectResult {
+                family: accepted.group.to_string(),
+                p_value: accepted.p_value,
+                heldout_rms_um: accepted.heldout_rms_mm * 1e3,
+                rms_gain_um: rms_gain_mm(&after, &after_fit, declared + k) * 1e3,
+                ..with_aliases(described, &after, accepted)
+            })
+        })
+        .collect::<Result<_, IdentifyError>>()?;
+    let steps = (accepted.iter().enumerate())
+        .map(|(k, accepted)| SearchStep {
+            id: accepted.effect.id(),
+            effects: k + 1,
+            heldout_rms_um: accepted.heldout_rms_mm * 1e3,
+        })
+        .collect();
+    let mut result = TraceResult {
+        verdict: verdict.gated(after_result.goodness.verdict),
+        changed_parameters: changed_parameters(&before_result.parameters, &after_result.parameters),
+        before: before_result,
+        unique: effects.iter().all(|effect| effect.unique),
+        effects,
+        remainder,
+        residual_before: residual_before(before, structure_before.as_ref(), true),
+        candidates: proposed + found.candidates,
+        candidates_detectable: proposed + found.detectable,
+        ..unsearched_of(&after, &after_fit, after_result)?
+    };
+    result.warnings.extend(ended.warnings);
+    if found.interrupted {
+        result.mark_interrupted();
+    }
+    let count = accepted.len();
+    let aliases_of = |accepted: &AcceptedEffect| accepted.aliases.iter().map(|alias| alias.effect.clone()).collect();
+    Ok(TraceOutcome {
+        before: before.clone(),
+        before_fit: before_fit.clone(),
+        alias_effects: accepted.iter().map(aliases_of).collect(),
+        effects: after.parameters.effects[declared..].to_vec(),
+        competing_effects: (0..count).map(|_| Vec::new()).collect(),
+        after,
+        after_fit,
+        steps,
+        strongest: None,
+        result,
+    })
+}
+
+/// The result of an effect with its aliases.
+fn with_aliases(of_effect: EffectResult, problem: &Problem, accepted: &AcceptedEffect) -> EffectResult {
+    let aliases: Vec<&Effect> = accepted.aliases.iter().map(|alias| &alias.effect).collect();
+    let costs: Vec<[f64; 2]> = accepted.aliases.iter().map(|alias| [alias.delta_chi2, alias.prior_cost]).collect();
+    explained_by(of_effect, problem, &accepted.effect, &aliases, &costs)
+}
+
+/// Rms of what an effect explains in addition to the rest of the model, mm: the increase of the sum of squares of
+/// readings and priors without the effect, `bᵀ C⁻¹ b` with the covariance `C` of its coefficients.
+fn rms_gain_mm(problem: &Problem, fit: &Fit, number: usize) -> f64 {
+    let list = &problem.parameters.list;
+    let own = |j: &usize| matches!(list[*j].role, Role::Coefficient { effect, .. } if effect == number);
+    let own: Vec<usize> = (0..list.len()).filter(own).collect();
+    let size = |k: usize| list[own[k]].size;
+    let covariance = Mat::from_fn(own.len(), own.len(), |i, k| fit.covariance[(own[i], own[k])] / (size(i) * size(k)));
+    let b = Mat::from_fn(own.len(), 1, |k, _| fit.beta[own[k]] / size(k));
+    let Ok(factor) = covariance.llt(Side::Lower) else { return 0.0 };
+    let increase = (b.transpose() * factor.solve(&b))[(0, 0)];
+    let rows = problem.scalars().max(1) as f64;
+    (increase.max(0.0) / rows).sqrt() * problem.noise.likelihood_mm()
+}

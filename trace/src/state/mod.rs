@@ -1,0 +1,144 @@
+//! The state of the search: the candidates with their products, and the selected effects.
+//!
+//! One branch searches on all readings. One further branch for each fold searches on the readings outside that fold
+//! ([`SearchBranch`]). Each branch selects for itself, and uses only shape numbers and positions that it has tuned
+//! itself. The held-out error therefore belongs to a search without access to the held-out readings.
+
+mod heldout;
+mod models;
+mod objective;
+mod pool;
+mod tuning;
+
+use std::sync::Arc;
+
+use abbe_identify::error::IdentifyError;
+use abbe_model::driver::Driver;
+use abbe_model::effect::{Component, Effect};
+
+use super::constants::{Effort, ON_ALL, ON_FOLDS};
+use super::interrupt::Interrupt;
+use super::policy::Policy;
+use crate::candidates::candidate::Candidate;
+use crate::candidates::columns::Columns;
+use crate::candidates::gram::Gram;
+pub use heldout::{RejectedByHeldOut, Selection, UnwhitenedModel};
+
+/// An effect that a search has selected.
+#[derive(Clone, Copy, Debug)]
+pub struct SelectedEffect {
+    /// Index of the candidate.
+    pub candidate: usize,
+    /// Probability that the search finds at least as high a score on readings without structure.
+    pub p_value: f64,
+}
+
+/// One branch of the search: on all readings, or on all but one fold.
+#[derive(Clone, Debug)]
+pub struct SearchBranch {
+    /// The training folds, ascending.
+    pub folds: Vec<usize>,
+    /// The selected effects.
+    pub selected: Vec<SelectedEffect>,
+}
+
+impl SearchBranch {
+    /// Indices of the selected candidates.
+    pub fn chosen(&self) -> Vec<usize> {
+        self.selected.iter().map(|selected| selected.candidate).collect()
+    }
+}
+
+/// Index of the branch on all readings. The branch that excludes fold `k` has index `k + 1`.
+pub(super) const ALL: usize = 0;
+
+/// The state of the search. A clone shares the products with the original and searches on its own.
+#[derive(Clone)]
+pub struct SearchState<'s> {
+    /// The policy for the readings.
+    pub policy: Policy,
+    /// The columns.
+    pub columns: &'s Columns<'s>,
+    /// The candidates.
+    pub candidates: Vec<Arc<Candidate>>,
+    /// All products.
+    pub gram: Gram<'s>,
+    /// The selected effects.
+    pub selection: Selection,
+    /// The accepted effects: additions that lowered the held-out error by more than the standard error of the decrease.
+    accepted: Selection,
+    /// The declared model: no effects.
+    declared: Selection,
+    /// For each round, the best score that readings without structure exceed with the probability of the significance
+    /// level.
+    pub thresholds: Vec<f64>,
+    /// Whether candidates of last resort are searched.
+    pub last_resort: bool,
+    /// The unwhitened model and residual for the held-out error.
+    unwhitened: Arc<UnwhitenedModel>,
+    /// Components and drivers that were tried in this round.
+    pub passed_over: Vec<(Component, Driver)>,
+    /// Effects that scored better than readings without structure but were not accepted, in order of addition.
+    pub rejected: Vec<RejectedByHeldOut>,
+    /// Number of the library's detectable effects. A dictionary counts once: its step tables share its identifier, and
+    /// their positions have a penalty of their own. Curves of last resort, some dozens compared with thousands, do not
+    /// count.
+    detectable_effects: usize,
+    /// Checked before each model is trained. `None` if the search must not be interrupted.
+    pub interrupt: Option<Interrupt<'s>>,
+}
+
+impl<'s> SearchState<'s> {
+    /// The state before the first round. `gram` holds the products of the candidates without those of last resort,
+    /// `reserve`.
+    ///
+    /// # Errors
+    /// If products are not finite.
+    pub fn new(
+        columns: &'s Columns<'s>,
+        candidates: Vec<Candidate>,
+        reserve: Vec<Candidate>,
+        gram: Gram<'s>,
+        unwhitened: UnwhitenedModel,
+        policy: Policy,
+    ) -> Result<SearchState<'s>, IdentifyError> {
+        let none = Selection::none(columns.fold_rows.len());
+        let mut search = SearchState {
+            policy,
+            columns,
+            candidates: candidates.into_iter().map(Arc::new).collect(),
+            gram,
+            selection: none.clone(),
+            accepted: none.clone(),
+            declared: none,
+            thresholds: Vec::new(),
+            last_resort: false,
+            unwhitened: Arc::new(unwhitened),
+            passed_over: Vec::new(),
+            rejected: Vec::new(),
+            detectable_effects: 0,
+            interrupt: None,
+        };
+        search.judge_detectability()?;
+        search.append(reserve);
+        search.note_held_out()?;
+        search.declared = search.selection.clone();
+        search.accepted = search.selection.clone();
+        Ok(search)
+    }
+
+    /// The selected effects of the branch on all readings.
+    pub fn selected(&self) -> &[SelectedEffect] {
+        self.selection.effects()
+    }
+
+    /// The effect of a candidate.
+    pub fn effect(&self, candidate: usize) -> &Effect {
+        &self.candidates[candidate].effect
+    }
+
+    /// How many candidates the steps of a branch with some training folds try.
+    pub fn effort(&self, folds: &[usize]) -> &'static Effort {
+        if folds.len() == self.selection.branches[ALL].folds.len() { &ON_ALL } else { &ON_FOLDS }
+    }
+}
