@@ -2,7 +2,8 @@
 build profile.
 
     pip install numpy scipy casadi jax
-    python identify/benches/peers.py
+    python identify/benches/peers.py           as text
+    python identify/benches/peers.py --json    for `benches/table.py`: by task the seconds of Abbe and of each tool
 
 1. Value and eight derivatives of the tests of chapter 5, a million readings: NumPy with derivatives by hand, CasADi and JAX
    with their own derivatives and compilers.
@@ -15,6 +16,7 @@ CasADi is compiled by gcc -O3 -march=native -fno-math-errno. Each figure is the 
 import json
 import os
 import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -25,6 +27,7 @@ from scipy.optimize import least_squares
 
 ROOT = Path(__file__).resolve().parents[2]
 READINGS = 1_000_000
+AS_JSON = "--json" in sys.argv
 FLAGS = "-O3 -march=native -fno-math-errno -shared -fPIC".split()
 
 
@@ -113,10 +116,13 @@ def derivatives():
     both = jax.jit(jax.vmap(jax.value_and_grad(reading, argnums=1), in_axes=(1, None)))
     device, device_errors = jnp.asarray(q), jnp.asarray(errors)
     found["JAX, jit(vmap(value_and_grad))"] = least(lambda: jax.block_until_ready(both(device, device_errors)))
+    if AS_JSON:
+        return {"value and eight derivatives of a million readings": (ours, found)}
     print(f"value and eight derivatives, {READINGS} readings, ns per reading (one thread unless the tool uses more)")
     print(f"  Abbe {ours / READINGS * 1e9:.1f}")
     for name, seconds in found.items():
         print(f"  {name} {seconds / READINGS * 1e9:.1f}: {seconds / ours:.1f} times Abbe's time")
+    return {}
 
 
 def fits():
@@ -198,13 +204,17 @@ def fits():
         start = time.perf_counter()
         beta, iterations = gauss_newton()
         results["CasADi, compiled, Gauss-Newton"] = (time.perf_counter() - start, beta, iterations)
+    if AS_JSON:
+        return {"fit of a million readings, 36 parameters": (ours, {name: took for name, (took, _, _) in results.items()})}
     print(f"fit of {READINGS} readings, 8 errors and 28 set-up parameters, s (Abbe's with rank, outliers, held-out error and uncertainty)")
     print(f"  Abbe {ours:.2f}")
     for name, (seconds, x, count) in results.items():
         off = np.abs(x - results["SciPy least_squares, trf"][1]).max() * 1e3
         print(f"  {name} {seconds:.2f} ({count} evaluations, {off:.1e} µm from the first): {seconds / ours:.1f} times Abbe's time")
+    return {}
 
 
 if __name__ == "__main__":
-    derivatives()
-    fits()
+    found = {**derivatives(), **fits()}
+    if AS_JSON:
+        print(json.dumps(found))

@@ -1,9 +1,9 @@
 """Speed and memory of the module: 10^6 readings of arrays, against the command and the kernel.
 
-    python python/benches/speed.py ABBE [KERNEL]
+    python python/benches/speed.py [--json] ABBE [KERNEL]
 
 ABBE is the command. KERNEL prints the times of the library on the same session:
-`cargo bench --quiet --bench session --`.
+`cargo bench --quiet --bench session --`. With `--json` the ratios are printed for `benches/table.py`.
 """
 
 import json
@@ -64,27 +64,37 @@ def mean_cpu_s(repeats: int, work) -> float:
 
 
 def main() -> None:
-    command, *kernel = sys.argv[1:]
+    arguments = sys.argv[1:]
+    as_json = "--json" in arguments
+    command, *kernel = [word for word in arguments if word != "--json"]
+    say = (lambda text: None) if as_json else print
     made, columns, added_mb = session()
     arrays_mb = sum(column.nbytes for column in columns.values()) / 2**20
-    print(f"arrays {arrays_mb:.0f} MB, session {added_mb:.0f} MB: {added_mb / arrays_mb:.2f} times the arrays")
+    say(f"arrays {arrays_mb:.0f} MB, session {added_mb:.0f} MB: {added_mb / arrays_mb:.2f} times the arrays")
     before = peak_mb()
     made.fit()
-    print(f"fit: {peak_mb() - before:.0f} MB more at its peak")
-    fit_s = mean_cpu_s(5, made.fit)
+    fit_mb = peak_mb() - before
+    say(f"fit: {fit_mb:.0f} MB more at its peak")
+    ratios = {"peak over arrays": (arrays_mb + added_mb + fit_mb) / arrays_mb}
     at = np.zeros(len(made.parameters))
-    predict_s = mean_cpu_s(50, lambda: made.predict(at))
-    jacobian_s = mean_cpu_s(20, lambda: made.jacobian(at))
-    print(f"fit {fit_s:.3f} s, predict {predict_s:.4f} s, jacobian {jacobian_s:.4f} s of processor time")
+    own = {
+        "fit": mean_cpu_s(5, made.fit),
+        "predict": mean_cpu_s(50, lambda: made.predict(at)),
+        "jacobian": mean_cpu_s(20, lambda: made.jacobian(at)),
+    }
+    say(", ".join(f"{name} {seconds:.4f} s" for name, seconds in own.items()) + " of processor time")
     with tempfile.TemporaryDirectory() as folder:
         file = made.save(Path(folder) / "saved")
         line = [command, "fit", file, "--quiet", "--json", f"{folder}/fit.json"]
-        whole = mean_cpu_s(1, lambda: subprocess.run(line, check=True))
-        print(f"the command from files: {whole:.2f} s of processor time")
+        whole = mean_cpu_s(1, lambda: subprocess.run(line, check=True, stdout=subprocess.DEVNULL))
+        say(f"the command from files: {whole:.2f} s of processor time")
         if kernel:
             times = json.loads(subprocess.run([*kernel, file], check=True, capture_output=True, text=True).stdout)
-            for name, own in [("fit", fit_s), ("predict", predict_s), ("jacobian", jacobian_s)]:
-                print(f"{name}: {own:.4f} s, in Rust {times[name]:.4f} s: {own / times[name]:.2f} times")
+            for name, seconds in own.items():
+                ratios[name] = seconds / times[name]
+                say(f"{name}: {seconds:.4f} s, in Rust {times[name]:.4f} s: {ratios[name]:.2f} times")
+    if as_json:
+        print(json.dumps(ratios))
 
 
 if __name__ == "__main__":
