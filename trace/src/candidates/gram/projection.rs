@@ -42,6 +42,8 @@ pub(in crate::candidates) struct Projection {
     pub residual: Mat<f64>,
     /// The rows that were left out; `None` if there are none.
     left_out: Option<LeftOut>,
+    /// `Wᵀ [X | y⊥]` over all rows. Without some folds it is formed anew, since a projection for each fold would hold one.
+    side: OnceLock<Arc<Adjoint>>,
     segments: Mutex<HashMap<usize, Arc<SegmentProducts>>>,
     /// By [`key`]: the effect keeps what the addresses refer to.
     chosen: Mutex<HashMap<(usize, usize), Arc<ChosenEffect>>>,
@@ -84,8 +86,15 @@ pub(in crate::candidates) struct ChosenEffect {
     pub lengths: Vec<f64>,
     /// Keeps the addresses that are its key.
     _set: EffectColumns,
-    side: OnceLock<Adjoint>,
+    side: OnceLock<Arc<Adjoint>>,
     segments: Mutex<HashMap<usize, Arc<Mat<f64>>>>,
+}
+
+impl ChosenEffect {
+    /// `Wᵀ E⊥` over its training rows.
+    pub fn side(&self, training: &TrainingRows) -> Arc<Adjoint> {
+        Arc::clone(self.side.get_or_init(|| Arc::new(Adjoint::of(training, self.rows.as_ref()))))
+    }
 }
 
 /// The key of an effect: the address of its basis functions and that of its channel.
@@ -139,6 +148,7 @@ impl Projection {
             inverse,
             residual,
             left_out,
+            side: OnceLock::new(),
             segments: Mutex::default(),
             chosen: Mutex::default(),
         })
@@ -163,6 +173,18 @@ impl Projection {
         })
     }
 
+    /// `Wᵀ [X | y⊥]` over the training rows.
+    pub fn side(&self, gram: &Gram<'_>) -> Arc<Adjoint> {
+        let formed = || {
+            let rank = gram.rank();
+            let mut side = Mat::zeros(gram.residual.len(), rank + 1);
+            side.as_mut().subcols_mut(0, rank).copy_from(gram.model());
+            side.as_mut().subcols_mut(rank, 1).copy_from(&self.residual);
+            Arc::new(Adjoint::of(&self.training, side.as_ref()))
+        };
+        if self.left_out.is_some() { formed() } else { Arc::clone(self.side.get_or_init(formed)) }
+    }
+
     fn of_all(
         &self,
         gram: &Gram<'_>,
@@ -171,12 +193,8 @@ impl Projection {
     ) -> Result<SegmentProducts, IdentifyError> {
         let layout = &gram.segments[segment].layout;
         let rank = gram.rank();
-        let mut side = Mat::zeros(gram.residual.len(), rank + 1);
-        side.as_mut().subcols_mut(0, rank).copy_from(gram.model());
-        side.as_mut().subcols_mut(rank, 1).copy_from(&self.residual);
-        let side = Adjoint::of(&self.training, side.as_ref());
-        let products =
-            layout.products(&self.training, &side, true, should_continue).ok_or(IdentifyError::Interrupted)?;
+        let products = layout.products(&self.training, &*self.side(gram), true, should_continue);
+        let products = products.ok_or(IdentifyError::Interrupted)?;
         let cross = products.side.subrows(0, rank);
         let solved = &self.inverse * cross;
         let mut d = products.own.clone();
@@ -235,9 +253,8 @@ impl Projection {
         segment: usize,
     ) -> Result<Arc<Mat<f64>>, IdentifyError> {
         stored(&chosen.segments, &gram.segments[segment].key, || {
-            let side = chosen.side.get_or_init(|| Adjoint::of(&self.training, chosen.rows.as_ref()));
             let layout = &gram.segments[segment].layout;
-            let products = layout.products(&self.training, side, false, &|| true);
+            let products = layout.products(&self.training, &*chosen.side(&self.training), false, &|| true);
             Ok(Arc::new(products.ok_or(IdentifyError::Interrupted)?.side))
         })
     }

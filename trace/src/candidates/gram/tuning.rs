@@ -12,7 +12,8 @@ use crate::candidates::columns::{Adjoint, Channel};
 
 /// What the columns of a tuned effect are multiplied with: the model, its residual, and the chosen effects.
 pub(in crate::candidates) struct TuningSide {
-    side: Adjoint,
+    /// Over the same rows: the model and the residual, then each chosen effect.
+    sides: Vec<Arc<Adjoint>>,
 }
 
 /// The sums over the states of one channel.
@@ -26,25 +27,23 @@ pub(in crate::candidates) struct ChannelProducts<'m> {
 impl TuningSide {
     /// Of a projection and chosen effects.
     pub fn of(gram: &Gram<'_>, projection: &Projection, chosen: &[Arc<ChosenEffect>]) -> TuningSide {
-        let rank = gram.rank();
-        let width = rank + 1 + chosen.iter().map(|chosen| chosen.rows.ncols()).sum::<usize>();
-        let mut vectors = Mat::zeros(projection.residual.nrows(), width);
-        vectors.as_mut().subcols_mut(0, rank).copy_from(gram.model());
-        vectors.as_mut().subcols_mut(rank, 1).copy_from(&projection.residual);
-        let mut next = rank + 1;
-        for chosen in chosen {
-            vectors.as_mut().subcols_mut(next, chosen.rows.ncols()).copy_from(&chosen.rows);
-            next += chosen.rows.ncols();
-        }
-        TuningSide { side: Adjoint::of(&projection.training, vectors.as_ref()) }
+        let of_chosen = chosen.iter().map(|chosen| chosen.side(&projection.training));
+        TuningSide { sides: std::iter::once(projection.side(gram)).chain(of_chosen).collect() }
     }
 
     /// The sums over the states of a channel.
     pub fn channel<'m>(&self, projection: &'m Projection, channel: &'m Arc<Channel>) -> ChannelProducts<'m> {
         let training = &projection.training;
-        let local = LocalStates::of(&channel.states, training, &self.side.rows);
-        let mut sums = Mat::zeros(self.side.values.nrows(), local.count());
-        local.gather(0..local.count(), std::slice::from_ref(channel), &self.side, sums.as_mut());
+        let local = LocalStates::of(&channel.states, training, &self.sides[0].rows);
+        let vectors: usize = self.sides.iter().map(|side| side.values.nrows()).sum();
+        let mut sums = Mat::zeros(vectors, local.count());
+        let mut first = 0;
+        for side in &self.sides {
+            let mut of_side = Mat::zeros(side.values.nrows(), local.count());
+            local.gather(0..local.count(), std::slice::from_ref(channel), side, of_side.as_mut());
+            sums.as_mut().subrows_mut(first, of_side.nrows()).copy_from(&of_side);
+            first += of_side.nrows();
+        }
         let own = OwnProducts::of(channel, &local, training);
         ChannelProducts { local, sums, own }
     }
