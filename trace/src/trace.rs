@@ -361,7 +361,7 @@ fn trace_or_interrupted(
         true => [structure_before.cloned(), structure_after],
         false => [structure_of_poses(problem, before_fit, options)?, structure_of_poses(&after, &after_fit, options)?],
     };
-    let mut reported = result::report(&result::TraceFindings {
+    let reported = result::report(&result::TraceFindings {
         before: problem,
         before_fit,
         after: &after,
@@ -376,9 +376,8 @@ fn trace_or_interrupted(
         interrupted,
         candidates: candidate_count,
         candidates_seen: observable,
+        warnings: screening::unused_exclusions(problem, options)?,
     })?;
-    reported.result.warnings.extend(screening::unused_exclusions(problem, options)?);
-    reported.result.warnings.extend(abbe_identify::plausibility::coefficients::warnings(problem, before_fit));
     drop(search);
     drop(columns);
     Ok(TraceOutcome {

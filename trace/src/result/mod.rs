@@ -1,21 +1,18 @@
 //! Results of a finished search.
 
+mod build;
 mod curve;
 mod effect;
 mod poses;
 mod prediction;
 mod rejected;
 mod steps;
-mod unsearched;
 mod verdict;
 
 use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::outcome::{self, Determined};
 use abbe_identify::fit::{self, Fit, prepare_with};
 use abbe_identify::heldout::cross_validation;
-use abbe_identify::heldout::mislabelled_runs;
-use abbe_identify::noise;
-use abbe_identify::plausibility::Plausibility;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{ChangedParameter, EffectResult, ModelResult, OfAngles, ParameterResult, TraceResult};
 use abbe_model::effect::Effect;
@@ -24,10 +21,11 @@ use super::alias::{self, Alias, CompetingEffect};
 use super::remainder::Structure;
 use super::state::SearchState;
 use crate::candidates::library;
+pub(super) use build::unsearched;
+use build::{Model, Statements, build};
 pub use effect::effect_name;
 pub(super) use poses::{PosesEnded, outcome_of_poses};
-pub(super) use unsearched::unsearched;
-use verdict::{not_examined, verdict};
+use verdict::verdict;
 
 /// The end state of a search.
 pub(super) struct TraceFindings<'f> {
@@ -49,6 +47,8 @@ pub(super) struct TraceFindings<'f> {
     pub interrupted: bool,
     pub candidates: usize,
     pub candidates_seen: usize,
+    /// Warnings about the options.
+    pub warnings: Vec<String>,
 }
 
 /// The result, with the data that reports need.
@@ -91,68 +91,40 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
     }
     let (after, after_fit) = with_aliases(findings, &chosen_candidates, &alias_effects)?;
     let (after, after_fit) = (&after, &after_fit);
-    let mut after_result = model_result(after, after_fit, held_out.last_um() * 1e-3)?;
+    let after_result = model_result(after, after_fit, held_out.last_um() * 1e-3)?;
     let (verdict, remainder) = verdict(findings, !search.selected().is_empty());
-    let determined = Determined::of(after, &after_fit.rank)?;
-    let goodness = after_result.goodness.with_structure(remainder.structured);
-    after_result.goodness = goodness;
-    determined.mark(after, &mut after_result.parameters, goodness);
     let families = library::families()?;
-    let effects: Vec<EffectResult> = (0..alias_effects.len())
-        .map(|k| {
+    let effects = |figures: &ModelResult| -> Result<Vec<EffectResult>, IdentifyError> {
+        let result = |k: usize| {
             let reported = effect::Found {
                 number: k,
                 candidate: chosen_candidates[k].0,
                 after,
                 after_fit,
-                parameters: &after_result.parameters,
+                parameters: &figures.parameters,
                 rms_gain_um: (gains[k] / held_out.rows).sqrt() * before.noise.sigma_mm * 1e3,
                 alias_effects: &alias_effects[k],
                 costs: &costs[k],
                 predicted: &predicted[k],
             };
             effect::result(findings, &families, &held_out, &reported)
-        })
-        .collect::<Result<_, _>>()?;
-    let mut warnings = before.session.warnings.clone();
-    warnings.extend(noise::stated_against_repeats(before, &before_fit.residuals));
-    warnings.extend(mislabelled_runs(&before.tests));
-    warnings.extend(fit::assumptions(after));
-    warnings.extend(not_assumed(findings, after));
-    let changed_parameters = changed_parameters(&before_result.parameters, &after_result.parameters);
-    let unique = effects.iter().all(|effect| effect.unique);
-    let mut result = TraceResult {
-        reading_unit: after.unit(),
-        verdict: verdict.gated(goodness.verdict),
-        outcome: outcome::outcome(after, after_fit, goodness, &determined),
-        interrupted: false,
-        time_limit_s: None,
-        unique,
-        noise_um: after.noise.sigma_mm * 1e3,
-        noise_source: after.noise.source,
-        noise_ar_coefficients: after.noise.ar_coefficients.clone(),
-        readings: after.readings(),
-        heldout_by: before.folds.kind.words().to_string(),
-        before: before_result,
-        after: after_result,
-        effects,
+        };
+        (0..alias_effects.len()).map(result).collect()
+    };
+    let mut warnings = not_assumed(findings, after);
+    warnings.extend(findings.warnings.iter().cloned());
+    let statements = Statements {
+        verdict,
         remainder,
         residual_before: residual_before(before, findings.structure_before, !search.selected().is_empty()),
-        rejected_candidates: rejected::candidates(&before.session.machine, search, &held_out),
-        changed_parameters,
-        candidates: findings.candidates,
-        candidates_detectable: findings.candidates_seen,
-        unobservable: fit::unobservable(after, &after_fit.rank),
-        null_space: fit::null_space(after, &after_fit.rank),
-        outliers: fit::outliers(after, after_fit),
-        conformity: None,
-        plausibility: Plausibility::default(),
+        rejected: rejected::candidates(&before.session.machine, search, &held_out),
+        candidates: [findings.candidates, findings.candidates_seen],
+        interrupted: findings.interrupted,
         warnings,
-        about: before.session.about.iter().cloned().collect(),
     };
-    if findings.interrupted {
-        result.mark_interrupted();
-    }
+    let declared = Model { problem: before, fit: before_fit, figures: before_result };
+    let found = Model { problem: after, fit: after_fit, figures: after_result };
+    let result = build(declared, found, statements, effects)?;
     let (after, after_fit) = (after.clone(), after_fit.clone());
     Ok(ReportedEffect { after, after_fit, result, alias_effects, competing_effects })
 }

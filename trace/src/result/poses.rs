@@ -2,18 +2,16 @@
 
 use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::Fit;
-use abbe_identify::fit::outcome::Determined;
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
-use abbe_identify::results::{EffectResult, TraceResult};
+use abbe_identify::results::{EffectResult, ModelResult};
 use abbe_model::effect::Effect;
 use faer::prelude::Solve;
 use faer::{Mat, Side};
 
 use super::effect::{described, explained_by};
-use super::unsearched::unsearched_of;
 use super::verdict::of_poses;
-use super::{changed_parameters, model_result, residual_before};
+use super::{Model, Statements, build, residual_before};
 use crate::poses::{AcceptedEffect, PoseModel, PoseSearch};
 use crate::remainder::Structure;
 use crate::{SearchStep, TraceOutcome};
@@ -40,16 +38,12 @@ pub(crate) fn outcome_of_poses(
     ended: PosesEnded,
 ) -> Result<TraceOutcome, IdentifyError> {
     let PoseModel { problem: after, fit: after_fit, effects: accepted, proposed } = found.model;
-    let before_result = model_result(before, before_fit, before_fit.held_out.rms_mm)?;
-    let mut after_result = model_result(&after, &after_fit, after_fit.held_out.rms_mm)?;
     let [structure_before, structure_after] = ended.structures;
     let (verdict, remainder) = of_poses(true, ended.stopped_early, structure_after.as_ref(), found.last_p_value);
-    after_result.goodness = after_result.goodness.with_structure(remainder.structured);
-    Determined::of(&after, &after_fit.rank)?.mark(&after, &mut after_result.parameters, after_result.goodness);
     let declared = before.parameters.effects.len();
-    let effects: Vec<EffectResult> = (accepted.iter().enumerate())
-        .map(|(k, accepted)| {
-            let described = described(&after, &after_fit, declared + k, &after_result.parameters)?;
+    let effects = |figures: &ModelResult| -> Result<Vec<EffectResult>, IdentifyError> {
+        let result = |(k, accepted): (usize, &AcceptedEffect)| {
+            let described = described(&after, &after_fit, declared + k, &figures.parameters)?;
             Ok(EffectResult {
                 family: accepted.group.to_string(),
                 p_value: accepted.p_value,
@@ -57,8 +51,9 @@ pub(crate) fn outcome_of_poses(
                 rms_gain_um: rms_gain_mm(&after, &after_fit, declared + k) * 1e3,
                 ..with_aliases(described, &after, accepted)
             })
-        })
-        .collect::<Result<_, IdentifyError>>()?;
+        };
+        accepted.iter().enumerate().map(result).collect()
+    };
     let steps = (accepted.iter().enumerate())
         .map(|(k, accepted)| SearchStep {
             id: accepted.effect.id(),
@@ -66,22 +61,16 @@ pub(crate) fn outcome_of_poses(
             heldout_rms_um: accepted.heldout_rms_mm * 1e3,
         })
         .collect();
-    let mut result = TraceResult {
-        verdict: verdict.gated(after_result.goodness.verdict),
-        changed_parameters: changed_parameters(&before_result.parameters, &after_result.parameters),
-        before: before_result,
-        unique: effects.iter().all(|effect| effect.unique),
-        effects,
+    let statements = Statements {
+        verdict,
         remainder,
         residual_before: residual_before(before, structure_before.as_ref(), true),
-        candidates: proposed + found.candidates,
-        candidates_detectable: proposed + found.detectable,
-        ..unsearched_of(&after, &after_fit, after_result)?
+        rejected: Vec::new(),
+        candidates: [proposed + found.candidates, proposed + found.detectable],
+        interrupted: found.interrupted,
+        warnings: ended.warnings,
     };
-    result.warnings.extend(ended.warnings);
-    if found.interrupted {
-        result.mark_interrupted();
-    }
+    let result = build(Model::of(before, before_fit)?, Model::of(&after, &after_fit)?, statements, effects)?;
     let count = accepted.len();
     let aliases_of = |accepted: &AcceptedEffect| accepted.aliases.iter().map(|alias| alias.effect.clone()).collect();
     Ok(TraceOutcome {
