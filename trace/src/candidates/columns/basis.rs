@@ -67,7 +67,7 @@ impl Columns<'_> {
         let acting: Vec<Acting> =
             parts.iter().map(|part| self.acting(&part.component, effect)).collect::<Option<_>>()?;
         let sensitivity =
-            |part: usize, test: usize, scalar: usize| acting[part].0[test].get(scalar).copied().map_or(0.0, f64::from);
+            |part: usize, test: usize, scalar: usize| acting[part].0[test].get(scalar).copied().unwrap_or_default();
         let axis = effect.component.axis(machine);
         let key = format!("{} turning {:?} {}", effect.component, effect.tests, driver_name(&effect.driver, axis));
         let channel = cached(&self.channels, key, || {
@@ -76,7 +76,7 @@ impl Columns<'_> {
             for (number, test) in self.problem.tests.iter().enumerate() {
                 let scalars = acting.iter().map(|(of_part, _)| of_part[number].len()).max().unwrap_or(0);
                 let norm = |scalar| (0..parts.len()).fold(0.0, |sum: f64, k| sum.hypot(sensitivity(k, number, scalar)));
-                total.push(Arc::new((0..scalars).map(|scalar| norm(scalar) as f32).collect::<Vec<f32>>()));
+                total.push(Arc::new((0..scalars).map(norm).collect::<Vec<f64>>()));
                 samples.push(match effect.acts_in(&test.name) && scalars > 0 {
                     true => Some(self.driver_samples(number, &effect.driver, axis, None)?),
                     false => None,
@@ -95,7 +95,7 @@ impl Columns<'_> {
                 for (k, column) in basis.iter_mut().enumerate() {
                     let of_part = |part: usize| sensitivity(part, test, scalar) * of_parts[part][k][state];
                     let sum: f64 = (0..parts.len()).map(of_part).sum();
-                    column[state] = if *total > 0.0 { sum / f64::from(*total) } else { 0.0 };
+                    column[state] = if *total > 0.0 { sum / total } else { 0.0 };
                 }
                 state += 1;
             }
@@ -167,12 +167,12 @@ impl Columns<'_> {
                     sensitivity.push(Arc::clone(derivative));
                     continue;
                 }
-                let mut of_test: Vec<f32> = Vec::new();
+                let mut of_test: Vec<f64> = Vec::new();
                 for (derivative, factor) in known {
                     of_test.resize(derivative.len(), 0.0);
                     let of_row = |row: usize| factor.as_ref().map_or(1.0, |factor| factor[row]);
                     for (i, (sum, derivative)) in of_test.iter_mut().zip(derivative.iter()).enumerate() {
-                        *sum += (f64::from(*derivative) * of_row(i / self.problem.channels(number))) as f32;
+                        *sum += derivative * of_row(i / self.problem.channels(number));
                     }
                 }
                 sensitivity.push(Arc::new(of_test));
@@ -247,7 +247,7 @@ impl Columns<'_> {
             let of_row = |(row, moved): (usize, usize)| if moved == channel && inside(row) { turned(row) } else { 0.0 };
             let of_test = (0..samples.len() * channels).map(|i| of_row((i / channels, i % channels)));
             let mut sensitivity = vec![Arc::default(); self.problem.tests.len()];
-            sensitivity[test] = Arc::new(of_test.map(|value| value as f32).collect());
+            sensitivity[test] = Arc::new(of_test.collect());
             let mut of_tests = vec![None; self.problem.tests.len()];
             of_tests[test] = Some(samples);
             let lagging = effect.shape.lag_s().map(|_| effect.driver.clone());

@@ -17,6 +17,7 @@ use abbe_identify::numerics::parallel;
 use abbe_identify::problem::{Problem, RowBlock};
 use abbe_identify::unit::ReadingUnit;
 use abbe_model::driver::DriverSample;
+use abbe_model::sensitivity::Sensitivities;
 pub use adjoint::{Adjoint, TrainingRows, WhitenedRows};
 pub use basis::{EffectColumns, chunked};
 use faer::{Mat, MatMut};
@@ -29,7 +30,7 @@ const ROWS_AT_ONCE: usize = 512;
 pub struct Columns<'p> {
     problem: &'p Problem,
     /// For each test the derivative of each scalar reading by each slot.
-    derivatives: Vec<HashMap<usize, Sensitivity>>,
+    derivatives: Vec<HashMap<usize, Arc<Vec<f64>>>>,
     blocks: Vec<RowBlock>,
     /// The scalar rows of each block that whitening keeps.
     kept: Vec<Vec<usize>>,
@@ -53,11 +54,7 @@ pub struct Columns<'p> {
 }
 
 /// The change of each scalar reading per unit of a component, by test, and the largest factor of a sensitivity in it.
-type Acting = (Vec<Sensitivity>, f64);
-
-/// The change of each scalar reading of a test per unit of a component. They are the largest array of a trace that finds
-/// nothing. Single precision halves it, as with the basis functions: a rounding of 10⁻⁷ decides nothing.
-pub type Sensitivity = Arc<Vec<f32>>;
+type Acting = (Vec<Arc<Vec<f64>>>, f64);
 
 type SharedSamples = Arc<Vec<DriverSample<f64>>>;
 
@@ -65,8 +62,9 @@ impl<'p> Columns<'p> {
     /// Computes the sensitivities at the parameter values of a fit.
     pub fn new(problem: &'p Problem, beta: &[f64]) -> Columns<'p> {
         let derivatives = sensitivities(problem, beta).into_iter();
-        let derivatives =
-            derivatives.map(|of_test| of_test.into_iter().map(|(slot, of_slot)| (slot, Arc::new(of_slot))).collect());
+        let derivatives = derivatives
+            .map(|of_test| of_test.slots.into_iter().zip(of_test.derivatives.into_iter().map(Arc::new)).collect())
+            .collect();
         let blocks = problem.blocks();
         let mut fold_of = Vec::new();
         let kept: Vec<Vec<usize>> = blocks.iter().map(|block| problem.kept_rows(block)).collect();
@@ -86,7 +84,7 @@ impl<'p> Columns<'p> {
         }
         Columns {
             problem,
-            derivatives: derivatives.collect(),
+            derivatives,
             blocks,
             kept,
             rows: target.len(),
@@ -127,7 +125,7 @@ impl<'p> Columns<'p> {
                     let basis = column_set.basis.col_as_slice(k);
                     let entries = raw.col_as_slice_mut(column + k).iter_mut().zip(sensitivity).enumerate();
                     let state = |i: usize| states.of_scalar(block.test, first + i, channels);
-                    entries.for_each(|(i, (entry, s))| *entry = f64::from(*s) * f64::from(basis[state(i)]));
+                    entries.for_each(|(i, (entry, s))| *entry = s * f64::from(basis[state(i)]));
                 }
             }
             column += column_set.count;
@@ -217,8 +215,8 @@ impl<'p> Columns<'p> {
     }
 }
 
-/// The sensitivities of every test by slot, computed in pieces that keep all cores busy with both short and long tests.
-fn sensitivities(problem: &Problem, beta: &[f64]) -> Vec<Vec<(usize, Vec<f32>)>> {
+/// The sensitivities of every test, computed in pieces that keep all cores busy with both short and long tests.
+fn sensitivities(problem: &Problem, beta: &[f64]) -> Vec<Sensitivities> {
     let values = problem.slot_values(beta);
     let pieces: Vec<(usize, Range<usize>)> = problem
         .models
@@ -234,16 +232,14 @@ fn sensitivities(problem: &Problem, beta: &[f64]) -> Vec<Vec<(usize, Vec<f32>)>>
     let parts = parallel::map(pieces.len(), &|k| {
         let (test, rows) = &pieces[k];
         let model = &problem.models[*test];
-        let found = model.sensitivities(&values[*test], &model.effective_slots(), rows.clone());
-        let rounded =
-            found.derivatives.into_iter().map(|of_slot| of_slot.into_iter().map(|value| value as f32).collect());
-        found.slots.into_iter().zip(rounded).collect::<Vec<(usize, Vec<f32>)>>()
+        model.sensitivities(&values[*test], &model.effective_slots(), rows.clone())
     });
-    let mut tests: Vec<Vec<(usize, Vec<f32>)>> = Vec::new();
+    let mut tests: Vec<Sensitivities> = Vec::new();
     for ((test, _), part) in pieces.iter().zip(parts) {
         match tests.get_mut(*test) {
             Some(whole) => {
-                for ((_, column), (_, more)) in whole.iter_mut().zip(part) {
+                whole.readings.extend(part.readings);
+                for (column, more) in whole.derivatives.iter_mut().zip(part.derivatives) {
                     column.extend(more);
                 }
             }
@@ -271,7 +267,8 @@ mod tests {
         session.tests[1].readings = Some(std::sync::Arc::new(without));
         let (problem, fit) = prepare(&session, 1).unwrap();
         let rows: Vec<usize> = problem.models.iter().map(|model| model.rows()).collect();
-        let found: Vec<usize> = sensitivities(&problem, &fit.beta).iter().map(|of_test| of_test[0].1.len()).collect();
+        let found: Vec<usize> =
+            sensitivities(&problem, &fit.beta).iter().map(|of_test| of_test.readings.len()).collect();
         assert_eq!(found, rows);
         assert_eq!(found[1], 0);
     }

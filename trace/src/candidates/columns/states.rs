@@ -8,8 +8,6 @@ use std::sync::Arc;
 
 use abbe_model::driver::{Driver, DriverPart, DriverSample};
 
-use super::Sensitivity;
-
 /// The distinct states of a driver, as far as the shapes that use one part of them can tell.
 #[derive(Debug)]
 pub struct DriverStates {
@@ -96,7 +94,7 @@ impl DriverStates {
 pub struct Channel {
     /// The change of each scalar reading per unit of the basis function, by test. Empty for a test in which the effect
     /// does not act.
-    pub sensitivity: Vec<Sensitivity>,
+    pub sensitivity: Vec<Arc<Vec<f64>>>,
     /// The states of the driver.
     pub states: Arc<DriverStates>,
     /// The largest absolute value of what multiplies the basis functions, other than the sensitivity of the component.

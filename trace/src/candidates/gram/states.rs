@@ -109,7 +109,7 @@ impl LocalStates {
                 let (test, scalar) = side.rows[*row as usize];
                 let values = side.values.col_as_slice(*row as usize);
                 for (channel, to) in channels.iter().zip(to.chunks_exact_mut(vectors.max(1))) {
-                    let sensitivity = f64::from(channel.sensitivity[test as usize][scalar as usize]);
+                    let sensitivity = channel.sensitivity[test as usize][scalar as usize];
                     to.iter_mut().zip(values).for_each(|(sum, value)| *sum += sensitivity * (*value).into());
                 }
             }
@@ -143,7 +143,7 @@ impl<'r> OwnProducts<'r> {
                         let scalar = block.start + raw;
                         (
                             local.place_of(&channel.states, block.test, scalar, training.channels[block.test]),
-                            factor * f64::from(sensitivity[scalar]),
+                            factor * sensitivity[scalar],
                         )
                     }));
                     for (k, (p, a)) in terms.iter().enumerate() {
@@ -236,7 +236,7 @@ impl<'r> OwnProducts<'r> {
                         let term = |(raw, factor): (usize, f64)| {
                             let scalar = block.start + raw;
                             let value: f64 = basis[states.of_scalar(block.test, scalar, channels)].into();
-                            factor * f64::from(sensitivity[scalar]) * value
+                            factor * sensitivity[scalar] * value
                         };
                         *value = training.filter.terms(i).map(term).sum();
                     }
