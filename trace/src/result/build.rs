@@ -14,6 +14,7 @@ use super::verdict::not_examined;
 use super::{changed_parameters, model_result};
 
 /// A fitted model and its figures.
+#[derive(Clone)]
 pub(super) struct Model<'m> {
     pub problem: &'m Problem,
     pub fit: &'m Fit,
@@ -116,5 +117,6 @@ pub(crate) fn unsearched(problem: &Problem, fit: &Fit) -> Result<TraceResult, Id
         interrupted: false,
         warnings: Vec::new(),
     };
-    build(Model::of(problem, fit)?, Model::of(problem, fit)?, statements, |_| Ok(Vec::new()))
+    let declared = Model::of(problem, fit)?;
+    build(declared.clone(), declared, statements, |_| Ok(Vec::new()))
 }
