@@ -121,21 +121,25 @@ struct Statistic {
 impl Statistic {
     /// The correlation of neighbours.
     fn correlation(&self, residual: &[f64]) -> f64 {
-        let value = |pose: usize| self.rows[pose].iter().map(|(row, weight)| weight * residual[*row]).sum::<f64>();
-        let square = |pose: usize| self.rows[pose].iter().map(|(row, _)| residual[*row].powi(2)).sum::<f64>();
         let vectors = |(a, b): (usize, usize)| {
             let (a, b) = (self.rows[a].iter(), self.rows[b].iter());
             a.zip(b).map(|((a, _), (b, _))| residual[*a] * residual[*b]).sum::<f64>()
         };
         let (mut products, mut squares) = (0.0, 0.0);
-        for &(a, b) in &self.pairs {
-            if self.projected {
-                let (a, b) = (value(a), value(b));
+        if self.projected {
+            let value =
+                |rows: &Vec<(usize, f64)>| rows.iter().map(|(row, weight)| weight * residual[*row]).sum::<f64>();
+            let values: Vec<f64> = self.rows.iter().map(value).collect();
+            for (a, b) in self.pairs.iter().map(|(a, b)| (values[*a], values[*b])) {
                 products += a * b;
                 squares += 0.5 * (a * a + b * b);
-            } else {
+            }
+        } else {
+            let square = |rows: &Vec<(usize, f64)>| rows.iter().map(|(row, _)| residual[*row].powi(2)).sum::<f64>();
+            let of_poses: Vec<f64> = self.rows.iter().map(square).collect();
+            for &(a, b) in &self.pairs {
                 products += vectors((a, b));
-                squares += 0.5 * (square(a) + square(b));
+                squares += 0.5 * (of_poses[a] + of_poses[b]);
             }
         }
         if squares > 0.0 { products / squares } else { 0.0 }
@@ -223,8 +227,8 @@ impl Poses {
             let own = asked[k];
             let others =
                 (0..points.len()).filter(|other| *other != own && self.rows[*other].len() == self.rows[own].len());
-            let distance = |other: &usize| squared_distance(points[own], points[*other]);
-            others.min_by(|a, b| distance(a).total_cmp(&distance(b))).map(|other| (own, other))
+            let distances = others.map(|other| (squared_distance(points[own], points[other]), other));
+            distances.min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, other)| (own, other))
         })
         .into_iter()
         .flatten()

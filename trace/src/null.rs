@@ -12,7 +12,6 @@
 //! The noise model is an estimate. Each draw has a standard deviation and an autocorrelation that differ from the
 //! estimates by their uncertainties.
 
-use std::collections::HashMap;
 use std::ops::Range;
 
 use abbe_identify::noise::trends::{TERMS, Trends};
@@ -54,8 +53,8 @@ pub fn draws<'d>(
 /// The residual with a random sign for each pose. `poses` are the poses of the values: the readings of several targets at
 /// one pose have one sign.
 fn sign_flipped(poses: &[usize], whitened: &[f64], generator: &mut Pcg64) -> Vec<f64> {
-    let mut signs: HashMap<usize, f64> = HashMap::new();
-    let flipped = |(pose, value): (&usize, &f64)| *signs.entry(*pose).or_insert_with(|| sign(generator)) * value;
+    let mut signs: Vec<Option<f64>> = vec![None; poses.iter().max().map_or(0, |last| last + 1)];
+    let flipped = |(pose, value): (&usize, &f64)| *signs[*pose].get_or_insert_with(|| sign(generator)) * value;
     poses.iter().zip(whitened).map(flipped).collect()
 }
 
