@@ -150,8 +150,10 @@ impl WhitenedDirections {
         if !self.complete {
             return Ok(None);
         }
-        let rows = fold.rows();
         let parameters = fold.columns();
+        // The eigenvalues of many rows cost more than the factor of these rows.
+        let reduced = (fold.rows().nrows() > parameters + 1).then(|| fold.reduced());
+        let rows = reduced.as_ref().map_or(fold.rows(), Mat::as_ref);
         if rows.nrows() == 0 || self.scaled_basis.ncols() == 0 {
             let step = &self.scaled_basis * &self.step;
             return Ok(Some(step.col(0).iter().copied().collect()));

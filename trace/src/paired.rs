@@ -16,7 +16,6 @@
 
 use std::collections::BTreeMap;
 
-use abbe_identify::fit::families::Scales;
 use abbe_identify::numerics::tails::chi_square_tail;
 
 /// Number of units below which the standard error is unreliable. Folds are then divided into blocks.
@@ -94,11 +93,6 @@ impl HeldOutDecrease {
             _ => differences.iter().map(|d| (d - by / count).powi(2)).sum::<f64>() * count / (count - 1.0),
         };
         HeldOutDecrease { by, standard_error: variance.sqrt() }
-    }
-
-    /// From one model of families to another of the same readings, by folds.
-    pub fn of_scales(before: &Scales, after: &Scales) -> HeldOutDecrease {
-        HeldOutDecrease::over_blocks(&before.held_out, &after.held_out)
     }
 
     /// Whether the held-out error decreases by more than the standard error.

@@ -287,9 +287,11 @@ fn trace_or_interrupted(
             true => Ok(None),
             false => structure_of_poses(problem, fit, options),
         };
+        let (before, after) =
+            parallel::both(|| structure(problem, before_fit), || structure(&found.problem, &found.fit));
         let ended = PosesEnded {
-            stopped_early: found.model.effects.len() >= policy.max_effects,
-            structures: [structure(problem, before_fit)?, structure(&found.model.problem, &found.model.fit)?],
+            stopped_early: found.effects.len() >= policy.max_effects,
+            structures: [before?, after?],
             warnings: screening::unused_exclusions(problem, options)?,
         };
         return result::outcome_of_poses(problem, before_fit, found, ended);

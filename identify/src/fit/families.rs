@@ -12,15 +12,15 @@
 //! ```
 //!
 //! `b₋ₖ` and `C₋ₖ` are mean and covariance without the fold. `κ = 1` if the folds are covered without inflation, as for
-//! independent noise. Everything follows from the triangular factors of the folds, without another pass over the
-//! readings.
+//! independent noise. Everything follows from the products `J_kᵀJ_k`, `J_kᵀy_k` and `y_kᵀy_k` of the folds, without another
+//! pass over the readings.
 
+mod bordered;
 mod estimate;
 
-use faer::linalg::solvers::Llt;
-use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::linalg::solvers::{DenseSolveCore, Llt};
 use faer::prelude::Solve;
-use faer::{Mat, Par, Side};
+use faer::{Mat, Side};
 
 use abbe_model::session::Prior;
 
@@ -28,9 +28,10 @@ use crate::error::IdentifyError;
 use crate::noise::NoiseSource;
 use crate::numerics::evidence::{NormalEquations, Posterior};
 use crate::numerics::parallel;
-use crate::numerics::triangle::Triangle;
+use crate::numerics::products::NormalProducts;
 use crate::parameters::{Parameters, Role};
 use crate::problem::Problem;
+pub use bordered::Bordered;
 
 /// A family of a problem: the effects that share a prior scale.
 #[derive(Clone, Debug)]
@@ -62,7 +63,7 @@ const FIRST_INFLATION: f64 = 30.0;
 /// physical sizes, those of one family in a common size. Readings are whitened with the noise of the problem.
 pub struct FoldEquations {
     equations: NormalEquations,
-    folds: Vec<FoldRows>,
+    folds: Vec<Fold>,
     /// Number of scalar readings.
     readings: f64,
     /// Index of each parameter among those of the problem.
@@ -74,12 +75,10 @@ pub struct FoldEquations {
     origin: Vec<f64>,
 }
 
-/// The rows of a fold over scaled parameters, and their products.
-struct FoldRows {
-    rows: Mat<f64>,
-    y: Mat<f64>,
-    gram: Mat<f64>,
-    projection: Vec<f64>,
+/// The readings of a fold over scaled parameters.
+struct Fold {
+    products: NormalProducts,
+    /// Number of scalar readings.
     readings: f64,
 }
 
@@ -103,11 +102,6 @@ impl Scales {
         self.held_out.iter().sum()
     }
 
-    /// Decrease of the penalised sum of squares of the tempered likelihood by the parameters.
-    pub fn explained(&self) -> f64 {
-        self.posterior.explained
-    }
-
     /// Effective number of parameters of each family.
     pub fn effective(&self) -> &[f64] {
         &self.posterior.effective
@@ -115,8 +109,11 @@ impl Scales {
 }
 
 impl FoldEquations {
-    /// From the triangular factors of the folds at the parameters `beta`.
-    pub fn of(problem: &Problem, beta: &[f64], triangles: &[Triangle]) -> FoldEquations {
+    /// The readings of a problem at the parameters `beta`.
+    ///
+    /// # Errors
+    /// If the model yields a number that is not finite.
+    pub fn of(problem: &Problem, beta: &[f64]) -> Result<FoldEquations, IdentifyError> {
         let list = &problem.parameters.list;
         let count = list.len();
         let families = families(&problem.parameters);
@@ -131,39 +128,24 @@ impl FoldEquations {
         }
         // In the coordinates x = (b − origin)/size the present point is not zero for coefficients of families.
         let present: Vec<f64> = (0..count).map(|j| (beta[j] - origin[j]) / sizes[j]).collect();
-        let absolute = |triangle: &Triangle| -> (Mat<f64>, Mat<f64>) {
-            let own = triangle.rows();
-            let rows = Mat::from_fn(own.nrows(), count, |i, j| own[(i, j)] * sizes[j]);
-            let y = Mat::from_fn(own.nrows(), 1, |i, _| {
-                own[(i, count)] + (0..count).map(|j| rows[(i, j)] * present[j]).sum::<f64>()
-            });
-            (rows, y)
-        };
-        let mut readings = vec![0.0; triangles.len()];
+        let products = problem.products(beta)?;
+        let mut readings = vec![0.0; products.len()];
         for (test, fold_of) in problem.folds.of_row.iter().enumerate() {
             let channels = problem.channels(test);
             for i in (0..fold_of.len() * channels).filter(|i| problem.counts(test, *i)) {
                 readings[fold_of[i / channels]] += 1.0;
             }
         }
-        let folds: Vec<FoldRows> = parallel::map(triangles.len(), &|k| {
-            let (rows, y) = absolute(&triangles[k]);
-            let gram = rows.transpose() * &rows;
-            let projection = (rows.transpose() * &y).col(0).iter().copied().collect();
-            FoldRows { rows, y, gram, projection, readings: readings[k] }
+        let folds = parallel::map(products.len(), &|fold| Fold {
+            products: products[fold].normal().in_sizes(&sizes, &present),
+            readings: readings[fold],
         });
-        let (mut gram, mut projection, mut square) = (Mat::zeros(count, count), vec![0.0; count], 0.0);
-        for fold in &folds {
-            gram += &fold.gram;
-            projection.iter_mut().zip(&fold.projection).for_each(|(sum, more)| *sum += more);
-            square += fold.y.squared_norm_l2();
-        }
+        let mut all = NormalProducts::none(count);
+        folds.iter().for_each(|fold| all.add(&fold.products));
         let (prior, prior_projection) = fixed_prior(problem, beta, &families, &sizes, &present);
-        FoldEquations {
+        Ok(FoldEquations {
             equations: NormalEquations {
-                gram,
-                projection,
-                square,
+                readings: all,
                 prior,
                 prior_projection,
                 families: families.into_iter().map(|family| family.parameters).collect(),
@@ -173,7 +155,7 @@ impl FoldEquations {
             parameters: (0..count).collect(),
             sizes,
             origin,
-        }
+        })
     }
 
     /// The same equations with some of the families only; the coefficients of the others are zero.
@@ -188,19 +170,11 @@ impl FoldEquations {
     /// The same equations with some of the parameters only, in ascending order; the others stay at the point of the
     /// linearisation. Families without parameters are dropped.
     pub fn with_parameters(&self, present: &[usize]) -> FoldEquations {
-        let square =
-            |matrix: &Mat<f64>| Mat::from_fn(present.len(), present.len(), |i, j| matrix[(present[i], present[j])]);
         let some = |values: &[f64]| -> Vec<f64> { present.iter().map(|j| values[*j]).collect() };
         FoldEquations {
             equations: self.equations_of(present),
             folds: (self.folds.iter())
-                .map(|fold| FoldRows {
-                    rows: Mat::from_fn(fold.rows.nrows(), present.len(), |i, j| fold.rows[(i, present[j])]),
-                    y: fold.y.clone(),
-                    gram: square(&fold.gram),
-                    projection: some(&fold.projection),
-                    readings: fold.readings,
-                })
+                .map(|fold| Fold { products: fold.products.of_parameters(present), readings: fold.readings })
                 .collect(),
             readings: self.readings,
             parameters: present.iter().map(|j| self.parameters[*j]).collect(),
@@ -212,32 +186,15 @@ impl FoldEquations {
     /// The normal equations of some of the parameters only.
     fn equations_of(&self, present: &[usize]) -> NormalEquations {
         let place = |j: &usize| present.binary_search(j).ok();
-        let square =
-            |matrix: &Mat<f64>| Mat::from_fn(present.len(), present.len(), |i, j| matrix[(present[i], present[j])]);
         let some = |values: &[f64]| -> Vec<f64> { present.iter().map(|j| values[*j]).collect() };
         let own = &self.equations;
         let families = own.families.iter().map(|family| family.iter().filter_map(place).collect::<Vec<usize>>());
         NormalEquations {
-            gram: square(&own.gram),
-            projection: some(&own.projection),
-            square: own.square,
-            prior: square(&own.prior),
+            readings: own.readings.of_parameters(present),
+            prior: Mat::from_fn(present.len(), present.len(), |i, j| own.prior[(present[i], present[j])]),
             prior_projection: some(&own.prior_projection),
             families: families.filter(|family| !family.is_empty()).collect(),
         }
-    }
-
-    /// [`Scales::explained`] of the model of [`FoldEquations::at_present`] with some of the parameters only, without the
-    /// held-out folds. `self` has all parameters.
-    ///
-    /// # Errors
-    /// If the equations are not positive definite.
-    pub fn explained_at_present(&self, present: &[usize], problem: &Problem) -> Result<f64, IdentifyError> {
-        let equations = self.equations_of(present);
-        let own = |family: &Vec<usize>| present[family[0]];
-        let precisions: Vec<f64> =
-            equations.families.iter().map(|family| self.precision(own(family), problem)).collect();
-        Ok(equations.posterior(1.0, &precisions)?.explained)
     }
 
     /// The present precision of the family of a parameter.
@@ -258,25 +215,22 @@ impl FoldEquations {
         parameters.iter().filter_map(effective).sum()
     }
 
-    /// The model with the present scales and the present noise of the problem that the equations are of.
+    /// Sum of squares of the residual of each held-out fold, in units of the whitening, with the present scales and the
+    /// present noise of the problem that the equations are of.
     ///
     /// # Errors
     /// If the equations are not positive definite.
-    pub fn at_present(&self, problem: &Problem) -> Result<Scales, IdentifyError> {
-        let precision = |own: &Vec<usize>| self.precision(own[0], problem);
-        let precisions: Vec<f64> = self.equations.families.iter().map(precision).collect();
-        // Rows whitened with the present noise have the unit variance.
-        self.model(precisions, 1.0 / problem.noise.inflation, problem.noise.inflation)
+    pub fn held_out_at_present(&self, problem: &Problem) -> Result<Vec<f64>, IdentifyError> {
+        let (variance, precisions) = self.present(problem);
+        let of_folds = parallel::map(self.folds.len(), &|k| Ok(self.residual_without(k, variance, &precisions)?.0));
+        of_folds.into_iter().collect()
     }
 
-    /// The model with given scales, variance and inflation.
-    fn model(&self, precisions: Vec<f64>, variance: f64, inflation: f64) -> Result<Scales, IdentifyError> {
-        let posterior = self.equations.posterior(inflation * variance, &precisions)?;
-        let of_folds = parallel::map(self.folds.len(), &|k| {
-            Ok(self.residual_without(k, inflation * variance, &precisions)?.0.squared_norm_l2())
-        });
-        let held_out = of_folds.into_iter().collect::<Result<_, IdentifyError>>()?;
-        Ok(Scales { precisions, variance, inflation, posterior, held_out })
+    /// Variance of a reading and precision of each family at the present scales and noise of the problem. Rows whitened
+    /// with the present noise, which includes the inflation, have the unit variance.
+    fn present(&self, problem: &Problem) -> (f64, Vec<f64>) {
+        let families = self.equations.families.iter();
+        (1.0, families.map(|own| self.precision(own[0], problem)).collect())
     }
 
     /// For each fold, the sum of squares of its residual under the model without it, and the sum of its variances from
@@ -305,26 +259,23 @@ impl FoldEquations {
 
     /// Sum of squares of a fold's residual under the model without it, and the sum of its variances from the parameters.
     fn without(&self, k: usize, variance: f64, precisions: &[f64]) -> Result<(f64, f64), IdentifyError> {
-        let (residual, factor) = self.residual_without(k, variance, precisions)?;
-        let mut along = self.folds[k].rows.transpose().to_owned();
-        solve_lower_triangular_in_place(factor.L(), along.as_mut(), Par::Seq);
-        Ok((residual.squared_norm_l2(), along.squared_norm_l2()))
+        let (square, factor) = self.residual_without(k, variance, precisions)?;
+        let (gram, covariance) = (&self.folds[k].products.gram, factor.inverse());
+        // tr J C Jᵀ
+        let of_column = |j: usize| gram.col_as_slice(j).iter().zip(covariance.col_as_slice(j));
+        let predicted = (0..gram.ncols()).flat_map(of_column).map(|(g, c)| g * c).sum();
+        Ok((square, predicted))
     }
 
-    /// A fold's residual under the model without it, and the Cholesky factor of the information of that model.
-    fn residual_without(
-        &self,
-        k: usize,
-        variance: f64,
-        precisions: &[f64],
-    ) -> Result<(Mat<f64>, Llt<f64>), IdentifyError> {
-        let fold = &self.folds[k];
+    /// Sum of squares of a fold's residual under the model without it, and the Cholesky factor of the information of that
+    /// model.
+    fn residual_without(&self, k: usize, variance: f64, precisions: &[f64]) -> Result<(f64, Llt<f64>), IdentifyError> {
+        let fold = &self.folds[k].products;
         let information = self.equations.information(variance, precisions) - &fold.gram * faer::Scale(1.0 / variance);
         let factor = information.llt(Side::Lower).map_err(|_| IdentifyError::Decomposition)?;
         let right = self.equations.right_side(variance);
         let right = Mat::from_fn(right.len(), 1, |j, _| right[j] - fold.projection[j] / variance);
-        let residual = &fold.y - &fold.rows * factor.solve(&right);
-        Ok((residual, factor))
+        Ok((fold.residual_square(factor.solve(&right).col_as_slice(0)), factor))
     }
 
     /// The parameters at the posterior mean, in internal units.

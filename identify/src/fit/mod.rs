@@ -37,7 +37,7 @@ pub use aliases::{
 pub use assume::{assume, statements as assumptions};
 pub use covariance::{null_space, of_parameters as covariance_of_parameters};
 pub use numbers::{NumberInterval, QUANTILE_95};
-pub use prepare::{prepare, prepare_with, refit, with_families, with_families_linearised, with_lever};
+pub use prepare::{NearMinimum, prepare, prepare_with, refit, with_families, with_families_linearised, with_lever};
 pub(crate) use quantities::{Quantity, quantities, values_at};
 pub use reported::{ids, outliers, parameters, report, rms_of_units, unobservable};
 
@@ -112,30 +112,6 @@ pub fn fit(problem: &Problem, start: Option<&[f64]>) -> Result<Fit, IdentifyErro
     finish(problem, minimum(problem, start)?)
 }
 
-/// The readings near the minimum: the triangular factors of the folds at some parameters.
-pub(crate) struct Linearisation {
-    /// The parameters, in internal units.
-    pub beta: Vec<f64>,
-    /// The factors, whitened with this noise.
-    pub triangles: Vec<Triangle>,
-    /// Standard deviation of a reading, mm.
-    pub noise_mm: f64,
-}
-
-/// The fit whose minimum `beta` is that of a linearisation, without another one.
-///
-/// # Errors
-/// If the model cannot be evaluated.
-pub(crate) fn linearised(problem: &Problem, beta: Vec<f64>, near: Linearisation) -> Result<Fit, IdentifyError> {
-    let (rank, _) = rank_at_nominal(problem)?;
-    let coordinates = rank.coordinates(&beta, &problem.parameters.sizes());
-    let beta = rank.parameters_at(&coordinates);
-    let step: Vec<f64> = beta.iter().zip(&near.beta).map(|(end, start)| end - start).collect();
-    let factor = near.noise_mm / problem.noise.likelihood_mm();
-    let triangles = near.triangles.iter().map(|triangle| triangle.after(&step).scaled(factor)).collect();
-    finish(problem, Minimum { beta, triangles, rank })
-}
-
 /// The minimum of the sum of squares of readings and priors.
 pub struct Minimum {
     /// Estimates of all parameters, in internal units (mm, rad).
@@ -191,6 +167,12 @@ fn rank_at_nominal(problem: &Problem) -> Result<(Rank, (Vec<f64>, Vec<Triangle>)
         Prior::Free | Prior::Known => 0.0,
     };
     Ok((rank.among(&kept, &problem.parameters.sizes(), least), (Vec::new(), Vec::new())))
+}
+
+/// The parameters with each combination that is not identifiable at its nominal value.
+fn identifiable(problem: &Problem, beta: &[f64]) -> Result<Vec<f64>, IdentifyError> {
+    let (rank, _) = rank_at_nominal(problem)?;
+    Ok(rank.parameters_at(&rank.coordinates(beta, &problem.parameters.sizes())))
 }
 
 /// Computes covariance, residuals, cross-validation and χ² at the solution.

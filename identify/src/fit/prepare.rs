@@ -7,9 +7,9 @@ use abbe_model::session::Session;
 use abbe_model::session::limits::MIN_UM;
 use faer::Mat;
 
+use super::Fit;
 use super::families::{FoldEquations, families};
 use super::numbers::{fit_with_numbers, intervals};
-use super::{Fit, Linearisation};
 use crate::error::IdentifyError;
 use crate::heldout::{rms_by_unit_mm, rms_mm};
 use crate::noise::outliers;
@@ -185,7 +185,21 @@ fn settled(mut problem: Problem, stated: bool, floor: f64) -> Result<(Problem, F
 /// # Errors
 /// See [`prepare`].
 pub fn with_families(problem: Problem, start: Vec<f64>) -> Result<(Problem, Fit), IdentifyError> {
-    in_turn_with_families(problem, start, |problem, beta: Vec<f64>, _| super::fit(problem, Some(&beta)))
+    in_turn_with_families(problem, start, |problem, beta, _| {
+        let fit = super::fit(problem, Some(&beta))?;
+        Ok((fit.beta.clone(), fit.residuals.clone(), fit))
+    })
+}
+
+/// A model of families near its minimum.
+#[derive(Clone, Debug)]
+pub struct NearMinimum {
+    /// Estimates of all parameters, in internal units.
+    pub beta: Vec<f64>,
+    /// Residuals by test, mm.
+    pub residuals: Vec<Vec<f64>>,
+    /// Root mean square of the held-out residuals, mm.
+    pub held_out_rms_mm: f64,
 }
 
 /// The same without iterations of the fit: a search compares many models, between which the parameters change by so little
@@ -193,29 +207,34 @@ pub fn with_families(problem: Problem, start: Vec<f64>) -> Result<(Problem, Fit)
 ///
 /// # Errors
 /// See [`prepare`].
-pub fn with_families_linearised(problem: Problem, start: Vec<f64>) -> Result<(Problem, Fit), IdentifyError> {
-    in_turn_with_families(problem, start, super::linearised)
+pub fn with_families_linearised(problem: Problem, start: Vec<f64>) -> Result<(Problem, NearMinimum), IdentifyError> {
+    in_turn_with_families(problem, start, |problem, beta, held_out_rms_mm| {
+        let beta = super::identifiable(problem, &beta)?;
+        let residuals = problem.residuals(&beta);
+        Ok((beta.clone(), residuals.clone(), NearMinimum { beta, residuals, held_out_rms_mm }))
+    })
 }
 
-/// Estimates scales and noise, and fits by `fit` from the estimates, in turn with the outliers.
-fn in_turn_with_families(
+/// Estimates scales and noise, and fits by `fit` from the estimates, in turn with the outliers. `fit` receives the
+/// held-out rms in mm, and returns parameters, residuals and what else it finds.
+fn in_turn_with_families<F>(
     mut problem: Problem,
     mut start: Vec<f64>,
-    fit: impl Fn(&Problem, Vec<f64>, Linearisation) -> Result<Fit, IdentifyError>,
-) -> Result<(Problem, Fit), IdentifyError> {
+    fit: impl Fn(&Problem, Vec<f64>, f64) -> Result<(Vec<f64>, Vec<Vec<f64>>, F), IdentifyError>,
+) -> Result<(Problem, F), IdentifyError> {
     let mut round = 0;
     loop {
-        let (triangles, noise_mm) = (problem.triangles(&start)?, problem.noise.likelihood_mm());
-        let equations = FoldEquations::of(&problem, &start, &triangles);
+        let equations = FoldEquations::of(&problem, &start)?;
         let scales = equations.estimate()?;
+        let held_out_rms_mm = (scales.held_out_sum() / equations.readings()).sqrt() * problem.noise.likelihood_mm();
         equations.apply(&scales, &mut problem);
-        let found = fit(&problem, equations.beta(&scales), Linearisation { beta: start, triangles, noise_mm })?;
-        let rejected = outliers::reject(&problem, &found.residuals);
+        let (beta, residuals, found) = fit(&problem, equations.beta(&scales), held_out_rms_mm)?;
+        let rejected = outliers::reject(&problem, &residuals);
         round += 1;
         if rejected == problem.rejected || round == MAX_ROUNDS {
             return Ok((problem, found));
         }
-        (start, problem.rejected) = (found.beta, rejected);
+        (start, problem.rejected) = (beta, rejected);
     }
 }
 

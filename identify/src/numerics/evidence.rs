@@ -17,17 +17,14 @@ use faer::linalg::solvers::DenseSolveCore;
 use faer::prelude::Solve;
 use faer::{Mat, Side};
 
+use super::products::NormalProducts;
 use crate::error::IdentifyError;
 
 /// The normal equations of readings of unit variance, the fixed priors, and the families.
 #[derive(Clone, Debug)]
 pub(crate) struct NormalEquations {
-    /// `JᵀJ`.
-    pub gram: Mat<f64>,
-    /// `Jᵀy`.
-    pub projection: Vec<f64>,
-    /// `yᵀy`.
-    pub square: f64,
+    /// The readings.
+    pub readings: NormalProducts,
     /// `P`: precision of the fixed priors.
     pub prior: Mat<f64>,
     /// The fixed priors times their means.
@@ -50,8 +47,6 @@ pub(crate) struct Posterior {
     pub log_evidence: f64,
     /// `‖y − J b‖²`.
     pub residual_square: f64,
-    /// Decrease of the penalised sum of squares by the parameters: the right-hand side times the mean.
-    pub explained: f64,
 }
 
 /// Largest change of `ln α` in one step: a factor of 20 in the precision.
@@ -66,7 +61,9 @@ const LIMITS: [f64; 2] = [0.0, 27.6];
 impl NormalEquations {
     /// `H` for a noise variance and the precisions of the families.
     pub fn information(&self, variance: f64, precisions: &[f64]) -> Mat<f64> {
-        let mut information = &self.prior + &self.gram * faer::Scale(1.0 / variance);
+        let (gram, weight) = (&self.readings.gram, 1.0 / variance);
+        let mut information =
+            Mat::from_fn(gram.nrows(), gram.ncols(), |i, j| self.prior[(i, j)] + gram[(i, j)] * weight);
         for (family, precision) in self.families.iter().zip(precisions) {
             for j in family {
                 information[(*j, *j)] += precision;
@@ -77,7 +74,8 @@ impl NormalEquations {
 
     /// The right-hand side of the normal equations: `Jᵀy/v` and the fixed priors.
     pub fn right_side(&self, variance: f64) -> Vec<f64> {
-        self.projection
+        self.readings
+            .projection
             .iter()
             .zip(&self.prior_projection)
             .map(|(of_readings, of_prior)| of_readings / variance + of_prior)
@@ -105,29 +103,18 @@ impl NormalEquations {
         let effective: Vec<f64> = (self.families.iter().zip(precisions))
             .map(|(family, precision)| (family.len() as f64 - precision * trace(family)).max(0.0))
             .collect();
-        let fixed: f64 =
-            (0..count).map(|i| (0..count).map(|j| self.prior[(i, j)] * covariance[(i, j)]).sum::<f64>()).sum();
+        let of_column = |j: usize| self.prior.col_as_slice(j).iter().zip(covariance.col_as_slice(j));
+        let fixed: f64 = (0..count).flat_map(of_column).map(|(prior, covariance)| prior * covariance).sum();
         let in_families: f64 = self.families.iter().map(|family| family.len() as f64).sum();
         let effective_total = count as f64 - in_families - fixed + effective.iter().sum::<f64>();
         Ok(Posterior {
-            log_evidence: -0.5 * (self.square / variance - explained + log_determinant - log_precisions),
-            residual_square: self.residual_square(&mean),
+            log_evidence: -0.5 * (self.readings.square / variance - explained + log_determinant - log_precisions),
+            residual_square: self.readings.residual_square(&mean),
             mean,
-            explained,
             covariance,
             effective,
             effective_total,
         })
-    }
-
-    /// `‖y − J b‖²`.
-    fn residual_square(&self, mean: &[f64]) -> f64 {
-        let mut square = self.square;
-        for (j, value) in mean.iter().enumerate() {
-            let along: f64 = self.gram.col_as_slice(j).iter().zip(mean).map(|(g, b)| g * b).sum();
-            square += value * (along - 2.0 * self.projection[j]);
-        }
-        square.max(0.0)
     }
 
     /// The precisions of the families at the maximum of the marginal likelihood for a noise variance, and the posterior
@@ -218,9 +205,11 @@ mod tests {
             let means: Vec<f64> = (0..groups).map(|k| spread * ((7 * k % 5) as f64 - 1.7)).collect();
             let square = means.iter().map(|mean| of_group * mean * mean).sum::<f64>() + 12.0;
             let equations = NormalEquations {
-                gram: Mat::from_fn(groups, groups, |i, j| if i == j { of_group } else { 0.0 }),
-                projection: means.iter().map(|mean| of_group * mean).collect(),
-                square,
+                readings: NormalProducts {
+                    gram: Mat::from_fn(groups, groups, |i, j| if i == j { of_group } else { 0.0 }),
+                    projection: means.iter().map(|mean| of_group * mean).collect(),
+                    square,
+                },
                 prior: Mat::zeros(groups, groups),
                 prior_projection: vec![0.0; groups],
                 families: vec![(0..groups).collect()],
@@ -268,9 +257,11 @@ mod tests {
         });
         let projection = jacobian.transpose() * &y;
         let equations = NormalEquations {
-            gram: jacobian.transpose() * &jacobian,
-            projection: (0..b.len()).map(|j| projection[(j, 0)]).collect(),
-            square: y.squared_norm_l2(),
+            readings: NormalProducts {
+                gram: jacobian.transpose() * &jacobian,
+                projection: (0..b.len()).map(|j| projection[(j, 0)]).collect(),
+                square: y.squared_norm_l2(),
+            },
             prior: Mat::from_fn(b.len(), b.len(), |i, j| if i == j && i < 2 { 0.01 } else { 0.0 }),
             prior_projection: vec![0.0; b.len()],
             families: vec![(2..12).collect(), vec![12, 13]],

@@ -88,8 +88,8 @@ impl Triangle {
         Triangle::of(wide)
     }
 
-    /// The upper-triangular form, from which `R`, `c`, `ρ` can be read.
-    fn reduced(&self) -> Mat<f64> {
+    /// The upper-triangular form `[R c; 0 ρ]`: (parameters + 1) × (parameters + 1).
+    pub(crate) fn reduced(&self) -> Mat<f64> {
         let width = self.columns + 1;
         if self.factor.nrows() == width && (0..width).all(|i| (0..i).all(|j| self.factor[(i, j)] == 0.0)) {
             return self.factor.clone();
@@ -121,11 +121,6 @@ impl Triangle {
             moved.factor[(i, self.columns)] -= predicted;
         }
         moved
-    }
-
-    /// The factor of the rows times a number.
-    pub fn scaled(&self, by: f64) -> Triangle {
-        Triangle { columns: self.columns, factor: &self.factor * faer::Scale(by) }
     }
 
     /// The sum of squares of the residuals.

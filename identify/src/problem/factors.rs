@@ -1,7 +1,6 @@
-//! The triangular factors of the folds, block by block.
+//! The triangular factors and the products of the folds, block by block.
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 
 use abbe_model::sensitivity::SlotValues;
 use faer::Mat;
@@ -9,13 +8,17 @@ use faer::Mat;
 use super::{Problem, RowBlock};
 use crate::error::IdentifyError;
 use crate::numerics::parallel;
+use crate::numerics::products::{Products, RowSum};
 use crate::numerics::triangle::Triangle;
 
-/// Triangular factors over the parameters of each test, by test and fold.
-type FactorsByTestAndFold = BTreeMap<(usize, usize), Triangle>;
+/// Sums of rows over the parameters of each test, by test and fold.
+type SumsByTestAndFold<S> = BTreeMap<(usize, usize), S>;
 
-/// Number of blocks that one parallel task evaluates.
-const BLOCKS_PER_SEGMENT: usize = 16;
+/// Number of blocks that one parallel task reduces to triangular factors, and to products: factors cost most to merge.
+const BLOCKS_OF_FACTORS: usize = 16;
+const BLOCKS_OF_PRODUCTS: usize = 4;
+/// Number of tasks whose sums are held at the same time: with hundreds of parameters each has many MB.
+const SEGMENTS_AT_ONCE: usize = 64;
 
 impl Problem {
     /// The triangular factor of each fold at the parameters `beta`, in internal units of the parameters.
@@ -23,37 +26,50 @@ impl Problem {
     /// # Errors
     /// If the model yields a number that is not finite.
     pub fn triangles(&self, beta: &[f64]) -> Result<Vec<Triangle>, IdentifyError> {
+        self.sums_of_folds(beta, BLOCKS_OF_FACTORS)
+    }
+
+    /// The products of the rows of each fold at the parameters `beta`, in internal units of the parameters.
+    ///
+    /// # Errors
+    /// If the model yields a number that is not finite.
+    pub fn products(&self, beta: &[f64]) -> Result<Vec<Products>, IdentifyError> {
+        self.sums_of_folds(beta, BLOCKS_OF_PRODUCTS)
+    }
+
+    fn sums_of_folds<S: RowSum>(&self, beta: &[f64], blocks_per_segment: usize) -> Result<Vec<S>, IdentifyError> {
         let values = self.slot_values(beta);
         // Segments have a fixed length, so that the sums do not depend on the number of threads.
         let blocks = self.blocks();
-        let segments: Vec<&[RowBlock]> = blocks.chunks(BLOCKS_PER_SEGMENT).collect();
-        let of_segments = parallel::map(segments.len(), &|k| self.factors_of_blocks(&values, segments[k]));
-        let mut factors = FactorsByTestAndFold::new();
-        for of_segment in of_segments {
-            for (place, triangle) in of_segment? {
-                match factors.entry(place) {
-                    Entry::Vacant(entry) => {
-                        entry.insert(triangle);
-                    }
-                    Entry::Occupied(mut sum) => sum.get_mut().merge(&triangle),
-                }
+        let segments: Vec<&[RowBlock]> = blocks.chunks(blocks_per_segment).collect();
+        let mut sums = BTreeMap::<(usize, usize), Vec<S>>::new();
+        for together in segments.chunks(SEGMENTS_AT_ONCE) {
+            let of_segments = parallel::map(together.len(), &|k| self.sums_of_blocks::<S>(&values, together[k]));
+            for of_segment in of_segments {
+                of_segment?.into_iter().for_each(|(place, own)| sums.entry(place).or_default().push(own));
             }
+            let parts: Vec<&Vec<S>> = sums.values().collect();
+            let merged = parallel::map(parts.len(), &|k| merged(parts[k]));
+            sums.values_mut().zip(merged).for_each(|(parts, sum)| *parts = sum.into_iter().collect());
         }
         let count = self.parameters.list.len();
-        let mut triangles = vec![Triangle::new(count); self.folds.count];
-        for ((test, fold), triangle) in factors {
-            triangles[fold].merge(&triangle.over_columns(&self.test_parameters[test].parameters, count));
-        }
-        Ok(triangles)
+        Ok(parallel::map(self.folds.count, &|fold| {
+            let mut of_fold = S::new(count);
+            for ((test, _), sum) in sums.iter().filter(|((_, of), _)| *of == fold) {
+                let wide = sum.iter().map(|sum| sum.over_columns(&self.test_parameters[*test].parameters, count));
+                wide.for_each(|sum| of_fold.merge(&sum));
+            }
+            of_fold
+        }))
     }
 
-    /// The triangular factors of some blocks over the parameters of their tests, by test and fold.
-    fn factors_of_blocks(
+    /// The sums of the rows of some blocks over the parameters of their tests, by test and fold.
+    fn sums_of_blocks<S: RowSum>(
         &self,
         values: &[SlotValues],
         blocks: &[RowBlock],
-    ) -> Result<FactorsByTestAndFold, IdentifyError> {
-        let mut factors = FactorsByTestAndFold::new();
+    ) -> Result<SumsByTestAndFold<S>, IdentifyError> {
+        let mut sums = SumsByTestAndFold::<S>::new();
         for block in blocks {
             let rows = self.own_rows(&values[block.test], block)?;
             let kept = self.kept_rows(block);
@@ -64,17 +80,25 @@ impl Problem {
             present.sort_unstable();
             present.dedup();
             for fold in &present {
-                let triangle = factors
+                let sum = sums
                     .entry((block.test, *fold))
-                    .or_insert_with(|| Triangle::new(self.test_parameters[block.test].parameters.len()));
+                    .or_insert_with(|| S::new(self.test_parameters[block.test].parameters.len()));
                 if present.len() == 1 {
-                    triangle.absorb(white.as_ref());
+                    sum.absorb(white.as_ref());
                 } else {
                     let chosen: Vec<usize> = (0..folds.len()).filter(|i| folds[*i] == *fold).collect();
-                    triangle.absorb(Mat::from_fn(chosen.len(), white.ncols(), |i, j| white[(chosen[i], j)]).as_ref());
+                    sum.absorb(Mat::from_fn(chosen.len(), white.ncols(), |i, j| white[(chosen[i], j)]).as_ref());
                 }
             }
         }
-        Ok(factors)
+        Ok(sums)
     }
+}
+
+/// The sum of some sums, in order.
+fn merged<S: RowSum>(parts: &[S]) -> Option<S> {
+    let (first, others) = parts.split_first()?;
+    let mut sum = first.clone();
+    others.iter().for_each(|other| sum.merge(other));
+    Some(sum)
 }

@@ -9,7 +9,7 @@ use abbe_identify::fit::families::FoldEquations;
 use abbe_identify::parameters::Role;
 use abbe_model::effect::Effect;
 
-use super::PoseModel;
+use super::PoseSearch;
 use super::single_effects::Library;
 use crate::candidates::candidate::Candidate;
 use crate::constants::{INDISTINGUISHABLE, MAX_TUNED_ALIASES};
@@ -31,7 +31,7 @@ pub(crate) struct PoseAlias {
 /// # Errors
 /// If a model cannot be evaluated, or [`IdentifyError::Interrupted`].
 pub(super) fn find(
-    model: &mut PoseModel,
+    model: &mut PoseSearch,
     library: &Library<'_>,
     interrupt: Interrupt<'_>,
 ) -> Result<(), IdentifyError> {
@@ -49,7 +49,7 @@ pub(super) fn find(
 
 /// The aliases of the `k`-th found effect, the most probable first.
 fn of_effect(
-    model: &PoseModel,
+    model: &PoseSearch,
     k: usize,
     library: &Library<'_>,
     interrupt: Interrupt<'_>,
@@ -69,7 +69,7 @@ fn of_effect(
         let id = candidate.effect.id();
         !model.effects.iter().any(|accepted| accepted.effect.id() == id)
     };
-    let nearest = library.nearest(model, &problem.residuals(&beta), interrupt)?;
+    let nearest = library.nearest(&model.effects, &problem.residuals(&beta), interrupt)?;
     let tried: Vec<&Candidate> = nearest.into_iter().filter(is_new).take(MAX_TUNED_ALIASES).collect();
     let mut own = vec![(0..present).filter(is_own).collect::<Vec<usize>>()];
     for candidate in &tried {
@@ -78,14 +78,11 @@ fn of_effect(
         own.push((next..all.parameters.list.len()).collect());
     }
     beta.resize(all.parameters.list.len(), 0.0);
-    let equations = FoldEquations::of(&all, &beta, &all.triangles(&beta)?);
+    let equations = FoldEquations::of(&all, &beta)?;
     let others: Vec<usize> = (0..present).filter(|j| !is_own(j)).collect();
-    let explained = |sets: &[usize]| -> Result<f64, IdentifyError> {
-        let mut parameters = others.clone();
-        parameters.extend(sets.iter().flat_map(|k| &own[*k]));
-        parameters.sort_unstable();
-        equations.explained_at_present(&parameters, &all)
-    };
+    let models = equations.bordered(&others, false, &all)?;
+    let explained =
+        |sets: &[usize]| models.explained(&sets.iter().flat_map(|k| own[*k].iter().copied()).collect::<Vec<_>>());
     let nothing = explained(&[])?;
     let by_found = explained(&[0])? - nothing;
     let mut aliases: Vec<PoseAlias> = Vec::new();

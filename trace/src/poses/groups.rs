@@ -148,14 +148,14 @@ pub(super) fn add(
     if groups.is_empty() {
         return Ok(false);
     }
-    let (problem, fit) = (&model.problem, &model.fit);
+    let problem = &model.problem;
     let mut all = problem.clone();
     for effect in groups.iter().flat_map(|group| &group.effects) {
         all.add_effect(effect)?;
     }
-    let mut beta = fit.beta.clone();
+    let mut beta = model.near.beta.clone();
     beta.resize(all.parameters.list.len(), 0.0);
-    let equations = FoldEquations::of(&all, &beta, &all.triangles(&beta)?);
+    let equations = FoldEquations::of(&all, &beta)?;
     interrupt.check()?;
     // The families of each group, those declared first.
     let names: Vec<String> = families(&all.parameters).into_iter().map(|family| family.name).collect();
@@ -200,7 +200,7 @@ pub(super) fn add(
             }
         }
         let Some((group, chosen, scales)) = best else { break };
-        let decrease = HeldOutDecrease::of_scales(&present.1, &scales);
+        let decrease = HeldOutDecrease::over_blocks(&present.1.held_out, &scales.held_out);
         if !decrease.is_significant() {
             break;
         }
@@ -259,8 +259,8 @@ fn finish(
         }
     }
     // As in a fit of a session that declares these effects.
-    let mut start = model.fit.beta.clone();
+    let mut start = model.near.beta.clone();
     start.resize(with.parameters.list.len(), 0.0);
-    (model.problem, model.fit) = with_families_linearised(with, start)?;
+    (model.problem, model.near) = with_families_linearised(with, start)?;
     Ok(())
 }

@@ -16,12 +16,13 @@ mod single_effects;
 
 use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::families::FoldEquations;
-use abbe_identify::fit::{Fit, with_families, with_families_linearised};
+use abbe_identify::fit::{Fit, NearMinimum, with_families, with_families_linearised};
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_model::axis::AxisKind;
 use abbe_model::effect::Effect;
 
+use super::candidates::columns::Columns;
 use super::constants::HIGHEST_ORDER_OF_SPECTRA;
 use super::interrupt::Interrupt;
 use super::policy::{Policy, has_few_poses};
@@ -31,17 +32,17 @@ pub(super) use aliases::PoseAlias;
 pub(super) use groups::proposed_ids;
 use single_effects::{Ended, Library, Limits};
 
-/// A fitted model with the effects that the search accepted.
+/// A model with the effects that the search accepted.
 #[derive(Clone)]
-pub(super) struct PoseModel {
+struct PoseModel {
     /// The problem with their effects.
-    pub problem: Problem,
-    /// Its fit.
-    pub fit: Fit,
+    problem: Problem,
+    /// Its estimates.
+    near: NearMinimum,
     /// The effects, in the order of the parameters.
-    pub effects: Vec<AcceptedEffect>,
+    effects: Vec<AcceptedEffect>,
     /// Number of effects in the proposed groups.
-    pub proposed: usize,
+    proposed: usize,
 }
 
 /// An accepted effect.
@@ -63,8 +64,14 @@ pub(super) struct AcceptedEffect {
 
 /// The outcome of a search.
 pub(super) struct PoseSearch {
-    /// The model.
-    pub model: PoseModel,
+    /// The problem with the accepted effects.
+    pub problem: Problem,
+    /// Its fit.
+    pub fit: Fit,
+    /// The effects, in the order of the parameters.
+    pub effects: Vec<AcceptedEffect>,
+    /// Number of effects in the proposed groups.
+    pub proposed: usize,
     /// Number of single effects that were screened.
     pub candidates: usize,
     /// Number of those that the readings would show.
@@ -77,17 +84,22 @@ pub(super) struct PoseSearch {
 
 impl PoseModel {
     fn of(problem: &Problem, fit: &Fit) -> PoseModel {
-        PoseModel { problem: problem.clone(), fit: fit.clone(), effects: Vec::new(), proposed: 0 }
+        let near = NearMinimum {
+            beta: fit.beta.clone(),
+            residuals: fit.residuals.clone(),
+            held_out_rms_mm: fit.held_out.rms_mm,
+        };
+        PoseModel { problem: problem.clone(), near, effects: Vec::new(), proposed: 0 }
     }
 
-    /// The fitted model without some of its effects.
+    /// The model without some of its effects.
     ///
     /// # Errors
     /// If it cannot be fitted.
     fn without(&self, declared: (&Problem, &Fit), removed: &[usize]) -> Result<PoseModel, IdentifyError> {
         let (mut problem, first) = (declared.0.clone(), declared.0.parameters.list.len());
         let mut effects = Vec::new();
-        let mut beta = self.fit.beta[..first].to_vec();
+        let mut beta = self.near.beta[..first].to_vec();
         let mut next = first;
         for (k, accepted) in self.effects.iter().enumerate() {
             let own = next..next + accepted.effect.shape.coefficients();
@@ -95,35 +107,11 @@ impl PoseModel {
             if !removed.contains(&k) {
                 problem.add_effect(&accepted.effect)?;
                 effects.push(accepted.clone());
-                beta.extend(&self.fit.beta[own]);
+                beta.extend(&self.near.beta[own]);
             }
         }
-        let (problem, fit) = with_families_linearised(problem, beta)?;
-        Ok(PoseModel { problem, fit, effects, proposed: self.proposed })
-    }
-
-    fn has_families(&self) -> bool {
-        self.effects.iter().any(|accepted| !accepted.is_single)
-    }
-
-    /// Whether its held-out error is lower than that of another model by more than the standard error of the difference.
-    fn predicts_better_than(&self, other: &PoseModel) -> bool {
-        HeldOutDecrease::over_blocks(&other.held_out_of_folds(self), &self.held_out_of_folds(other)).is_significant()
-    }
-
-    /// Sums of squares of the held-out residuals of the folds, mm², over the readings that another model counts too.
-    fn held_out_of_folds(&self, other: &PoseModel) -> Vec<f64> {
-        let folds = &self.problem.folds;
-        let mut sums = vec![0.0; folds.count];
-        for (test, of_row) in folds.of_row.iter().enumerate() {
-            let channels = self.problem.channels(test);
-            for (i, value) in self.fit.held_out.residuals[test].iter().enumerate() {
-                if self.problem.counts(test, i) && other.problem.counts(test, i) {
-                    sums[of_row[i / channels]] += value * value;
-                }
-            }
-        }
-        sums
+        let (problem, near) = with_families_linearised(problem, beta)?;
+        Ok(PoseModel { problem, near, effects, proposed: self.proposed })
     }
 }
 
@@ -155,34 +143,33 @@ pub(super) fn search(
         let held_out_um = accepted.heldout_rms_mm * 1e3;
         (interrupt.0)(Progress::SelectedEffect(k + 1, accepted.effect.id(), held_out_um, problem.unit()));
     }
-    let library = Library::of(problem, fit, options)?;
+    let columns = Columns::new(problem, &fit.beta);
+    let library = Library::of(problem, &columns, fit, options)?;
     (interrupt.0)(Progress::Screening(library.count()));
     let limits = Limits { effects: most, significance: policy.significance, to_reach_mm: None };
     let ended = complete((problem, fit), &mut with, &library, options, true, limits, interrupt);
     let mut chosen = PoseSearch::of(with, &library, ended)?;
     if may_repeat && !chosen.interrupted {
         let mut without = PoseModel::of(problem, fit);
-        let limits = Limits { to_reach_mm: Some(chosen.model.fit.held_out.rms_mm), ..limits };
+        let limits = Limits { to_reach_mm: Some(chosen.fit.held_out.rms_mm), ..limits };
         let ended = groups::add(&mut without, options, false, most, interrupt).and_then(|has_groups| {
             if !has_groups {
-                (without.problem, without.fit) = with_families_linearised(without.problem.clone(), fit.beta.clone())?;
+                (without.problem, without.near) = with_families_linearised(without.problem.clone(), fit.beta.clone())?;
             }
             complete((problem, fit), &mut without, &library, options, false, limits, interrupt)
         });
         let single = PoseSearch::of(without, &library, ended)?;
         // An interrupted repetition says nothing of what single effects could reach.
         chosen.interrupted = single.interrupted;
-        if !single.interrupted && !chosen.model.predicts_better_than(&single.model) {
+        if !single.interrupted && !chosen.predicts_better_than(&single) {
             chosen = single;
         }
     }
-    if !chosen.model.has_families() {
+    if !chosen.has_families() {
         return Ok(None);
     }
-    let model = &mut chosen.model;
-    (model.problem, model.fit) = with_families(model.problem.clone(), model.fit.beta.clone())?;
     if !chosen.interrupted {
-        match aliases::find(&mut chosen.model, &library, interrupt) {
+        match aliases::find(&mut chosen, &library, interrupt) {
             Err(IdentifyError::Interrupted) => chosen.interrupted = true,
             found => found?,
         }
@@ -202,7 +189,10 @@ fn determines_spectra(problem: &Problem) -> bool {
 }
 
 impl PoseSearch {
-    /// A model and how its search ended. The effects accepted before an interruption remain.
+    /// The fit of a model and how its search ended. The effects accepted before an interruption remain.
+    ///
+    /// # Errors
+    /// If the search ended with an error, or the model cannot be fitted.
     fn of(
         model: PoseModel,
         library: &Library<'_>,
@@ -213,7 +203,34 @@ impl PoseSearch {
             ended => (ended?, false),
         };
         let Ended { detectable, last_p_value } = ended;
-        Ok(PoseSearch { model, candidates: library.count(), detectable, last_p_value, interrupted })
+        let PoseModel { problem, near, effects, proposed } = model;
+        let (problem, fit) = with_families(problem, near.beta)?;
+        let candidates = library.count();
+        Ok(PoseSearch { problem, fit, effects, proposed, candidates, detectable, last_p_value, interrupted })
+    }
+
+    fn has_families(&self) -> bool {
+        self.effects.iter().any(|accepted| !accepted.is_single)
+    }
+
+    /// Whether its held-out error is lower than that of another model by more than the standard error of the difference.
+    fn predicts_better_than(&self, other: &PoseSearch) -> bool {
+        HeldOutDecrease::over_blocks(&other.held_out_of_folds(self), &self.held_out_of_folds(other)).is_significant()
+    }
+
+    /// Sums of squares of the held-out residuals of the folds, mm², over the readings that another model counts too.
+    fn held_out_of_folds(&self, other: &PoseSearch) -> Vec<f64> {
+        let folds = &self.problem.folds;
+        let mut sums = vec![0.0; folds.count];
+        for (test, of_row) in folds.of_row.iter().enumerate() {
+            let channels = self.problem.channels(test);
+            for (i, value) in self.fit.held_out.residuals[test].iter().enumerate() {
+                if self.problem.counts(test, i) && other.problem.counts(test, i) {
+                    sums[of_row[i / channels]] += value * value;
+                }
+            }
+        }
+        sums
     }
 }
 
@@ -254,14 +271,15 @@ fn remove_needless(
         };
         // A parameter that is left out keeps its value, which is zero then.
         let beta: Vec<f64> =
-            model.fit.beta.iter().enumerate().map(|(j, b)| if found(j).is_some() { 0.0 } else { *b }).collect();
-        let equations = FoldEquations::of(problem, &beta, &problem.triangles(&beta)?);
-        let with = equations.at_present(problem)?;
+            model.near.beta.iter().enumerate().map(|(j, b)| if found(j).is_some() { 0.0 } else { *b }).collect();
+        let equations = FoldEquations::of(problem, &beta)?;
+        let with = equations.held_out_at_present(problem)?;
         let mut least: Option<(Vec<usize>, f64)> = None;
         for members in together(&model.effects) {
             let stays = |j: &usize| found(*j).is_none_or(|effect| !members.contains(&effect));
             let kept: Vec<usize> = (0..list.len()).filter(stays).collect();
-            let rise = HeldOutDecrease::of_scales(&equations.with_parameters(&kept).at_present(problem)?, &with);
+            let without = equations.with_parameters(&kept).held_out_at_present(problem)?;
+            let rise = HeldOutDecrease::over_blocks(&without, &with);
             if !rise.is_significant() && least.as_ref().is_none_or(|(_, by)| rise.by < *by) {
                 least = Some((members, rise.by));
             }

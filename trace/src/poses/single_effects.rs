@@ -27,38 +27,45 @@ use crate::start::Start;
 use crate::{Progress, TraceOptions, screening};
 
 /// The candidates of the library for the declared model.
-pub(super) struct Library<'p> {
-    columns: Columns<'p>,
-    start: Start,
+pub(super) struct Library<'c> {
+    columns: &'c Columns<'c>,
+    /// The products of the candidates, over the declared model and its residual.
+    gram: Gram<'c>,
     candidates: Vec<Candidate>,
     families: Vec<Family>,
 }
 
-impl<'p> Library<'p> {
+impl<'c> Library<'c> {
     /// The requested single effects of the library.
     ///
     /// # Errors
     /// If the model cannot be evaluated, or a requested string occurs in no identifier.
-    pub fn of(problem: &'p Problem, fit: &Fit, options: &TraceOptions) -> Result<Library<'p>, IdentifyError> {
-        let columns = Columns::new(problem, &fit.beta);
-        let start = Start::of(problem, &columns, fit)?;
-        let searched = screening::searched_candidates(problem, &columns, options)?;
+    pub fn of(
+        problem: &Problem,
+        columns: &'c Columns<'c>,
+        fit: &Fit,
+        options: &TraceOptions,
+    ) -> Result<Library<'c>, IdentifyError> {
+        let start = Start::of(problem, columns, fit)?;
+        let searched = screening::searched_candidates(problem, columns, options)?;
         let is_single = |candidate: &Candidate| !candidate.last_resort && !candidate.dictionary;
-        let candidates = searched.into_iter().filter(is_single).collect();
-        Ok(Library { columns, start, candidates, families: library::families()? })
+        let candidates: Vec<Candidate> = searched.into_iter().filter(is_single).collect();
+        let sets: Vec<EffectColumns> = candidates.iter().map(|candidate| candidate.columns.clone()).collect();
+        let gram = Gram::new(columns, sets, start.model.clone(), &start.residual, start.prior());
+        Ok(Library { columns, gram, candidates, families: library::families()? })
     }
 
-    /// The candidates with a gain in a residual, the largest evidence first, without those of a model.
+    /// The candidates with a gain in a residual, the largest evidence first, without some effects.
     ///
     /// # Errors
     /// If the gains cannot be computed, or [`IdentifyError::Interrupted`].
     pub fn nearest(
         &self,
-        model: &PoseModel,
+        effects: &[AcceptedEffect],
         residuals: &[Vec<f64>],
         interrupt: Interrupt<'_>,
     ) -> Result<Vec<&Candidate>, IdentifyError> {
-        Ok(scored(self, model, residuals, interrupt)?.0.into_iter().map(|(k, _)| &self.candidates[k]).collect())
+        Ok(scored(self, effects, residuals, interrupt)?.0.into_iter().map(|(k, _)| &self.candidates[k]).collect())
     }
 
     /// Number of candidates.
@@ -108,13 +115,13 @@ pub(super) fn add(
         let (best, last_p_value) = best_of(found, &tried, library.count(), limits.significance, interrupt)?;
         ended.last_p_value = last_p_value;
         let Some(best) = best else { break };
-        let before_mm = found.fit.held_out.rms_mm;
+        let before_mm = found.near.held_out_rms_mm;
         let mut with = found.problem.clone();
         with.add_effect(&best.candidate.effect)?;
-        let mut beta = found.fit.beta.clone();
+        let mut beta = found.near.beta.clone();
         beta.resize(with.parameters.list.len(), 0.0);
         interrupt.check()?;
-        (found.problem, found.fit) = with_families_linearised(with, beta)?;
+        (found.problem, found.near) = with_families_linearised(with, beta)?;
         added += 1;
         let family = library.families.get(best.candidate.family);
         found.effects.push(AcceptedEffect {
@@ -131,7 +138,7 @@ pub(super) fn add(
             continue;
         };
         // No later effect lowers the error by more than this one did.
-        let [now, before, least] = [found.fit.held_out.rms_mm, before_mm, to_reach_mm].map(|rms| rms * rms);
+        let [now, before, least] = [found.near.held_out_rms_mm, before_mm, to_reach_mm].map(|rms| rms * rms);
         let further = MAX_IN_PLACE_OF_FAMILIES.saturating_sub(added) as f64;
         if now - further * (before - now).max(0.0) > least {
             break;
@@ -147,7 +154,7 @@ struct Ranked {
 }
 
 fn ranked(library: &Library<'_>, found: &PoseModel, interrupt: Interrupt<'_>) -> Result<Ranked, IdentifyError> {
-    let (scored, detectable) = scored(library, found, &found.fit.residuals, interrupt)?;
+    let (scored, detectable) = scored(library, &found.effects, &found.near.residuals, interrupt)?;
     // One for each component and driver, so that the neighbouring orders of one cause do not take all places.
     let mut kinds: Vec<(String, Driver)> = Vec::new();
     let mut is_new = |k: usize| {
@@ -161,26 +168,24 @@ fn ranked(library: &Library<'_>, found: &PoseModel, interrupt: Interrupt<'_>) ->
     Ok(Ranked { best, detectable })
 }
 
-/// The candidates that are not in a model and their scores in a residual, the largest first, and the number of candidates
+/// The candidates other than the accepted effects and their scores in a residual, the largest first, and the number of candidates
 /// that are observable beside the declared parameters.
 fn scored(
     library: &Library<'_>,
-    found: &PoseModel,
+    effects: &[AcceptedEffect],
     residuals: &[Vec<f64>],
     interrupt: Interrupt<'_>,
 ) -> Result<(Vec<(usize, f64)>, usize), IdentifyError> {
-    let Library { columns, start, candidates, .. } = library;
-    let sets: Vec<EffectColumns> = candidates.iter().map(|candidate| candidate.columns.clone()).collect();
+    let Library { columns, gram, candidates, .. } = library;
     let residual = columns.whitened_values(residuals);
     let should_continue = || interrupt.check().is_ok();
-    let gram = Gram::new(columns, sets, start.model.clone(), &residual, start.prior());
+    let gram = gram.with_residual(&residual, &should_continue)?;
     let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
-    gram.prepare(&[], &should_continue)?;
     let trained = TrainedModel::new(&gram, &[], &folds)?;
     let square: f64 = residual.iter().map(|value| value * value).sum();
     let variance = (square / columns.rows().max(1) as f64).max(f64::MIN_POSITIVE);
     let gains = trained.gains(&|_| true)?;
-    let chosen: Vec<_> = found.effects.iter().map(|found| &found.effect).collect();
+    let chosen: Vec<_> = effects.iter().map(|accepted| &accepted.effect).collect();
     let mut scored: Vec<(usize, f64)> = (gains.iter().enumerate())
         .filter(|(k, gain)| gain.freedom > 0 && !chosen.contains(&&candidates[*k].effect))
         .map(|(k, gain)| (k, -ln_chi_square_tail(gain.gain / variance, gain.freedom) - candidates[k].cost))
@@ -219,25 +224,26 @@ fn best_of<'c>(
         all.add_effect(&candidate.effect)?;
         own.push(first..all.parameters.list.len());
     }
-    let mut beta = found.fit.beta.clone();
+    let mut beta = found.near.beta.clone();
     beta.resize(all.parameters.list.len(), 0.0);
-    let equations = FoldEquations::of(&all, &beta, &all.triangles(&beta)?);
+    let equations = FoldEquations::of(&all, &beta)?;
     interrupt.check()?;
-    let without = equations.with_parameters(&(0..present).collect::<Vec<_>>()).at_present(&all)?;
+    let models = equations.bordered(&(0..present).collect::<Vec<_>>(), true, &all)?;
+    let (without, by_present) = (models.held_out(&[])?, models.explained(&[])?);
     let mut accepted: Vec<Lowering<'c>> = Vec::new();
     let mut last = 1.0_f64;
     for (candidate, own) in tried.iter().zip(own) {
         interrupt.check()?;
-        let parameters: Vec<usize> = (0..present).chain(own).collect();
-        let with = equations.with_parameters(&parameters).at_present(&all)?;
-        let decrease = HeldOutDecrease::of_scales(&without, &with);
+        let own: Vec<usize> = own.collect();
+        let with = models.held_out(&own)?;
+        let decrease = HeldOutDecrease::over_blocks(&without, &with);
         // The best of all candidates, by the bound of Bonferroni.
-        let gain = (with.explained() - without.explained()).max(0.0);
+        let gain = (models.explained(&own)? - by_present).max(0.0);
         let tail = ln_chi_square_tail(gain, candidate.columns.count);
         let p_value = (tail + (candidates as f64).ln()).min(0.0).exp();
         last = last.min(p_value);
         if p_value <= significance && decrease.is_significant() {
-            let held_out_mm = (with.held_out_sum() / equations.readings()).sqrt() * all.noise.likelihood_mm();
+            let held_out_mm = (with.iter().sum::<f64>() / equations.readings()).sqrt() * all.noise.likelihood_mm();
             accepted.push(Lowering { candidate, p_value, held_out_mm, decrease: decrease.by, gain });
         }
     }

@@ -12,7 +12,7 @@ use faer::{Mat, Side};
 use super::effect::{described, explained_by};
 use super::verdict::of_poses;
 use super::{Model, Statements, build, residual_before};
-use crate::poses::{AcceptedEffect, PoseModel, PoseSearch};
+use crate::poses::{AcceptedEffect, PoseSearch};
 use crate::remainder::Structure;
 use crate::{SearchStep, TraceOutcome};
 
@@ -37,7 +37,7 @@ pub(crate) fn outcome_of_poses(
     found: PoseSearch,
     ended: PosesEnded,
 ) -> Result<TraceOutcome, IdentifyError> {
-    let PoseModel { problem: after, fit: after_fit, effects: accepted, proposed } = found.model;
+    let PoseSearch { problem: after, fit: after_fit, effects: accepted, proposed, .. } = found;
     let [structure_before, structure_after] = ended.structures;
     let (verdict, remainder) = of_poses(true, ended.stopped_early, structure_after.as_ref(), found.last_p_value);
     let declared = before.parameters.effects.len();

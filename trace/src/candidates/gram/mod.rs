@@ -198,6 +198,21 @@ impl<'c> Gram<'c> {
         Adjoint { rows, values }
     }
 
+    /// The products of the library over all rows with another residual.
+    ///
+    /// # Errors
+    /// If products are not finite, or [`IdentifyError::Interrupted`] if `should_continue` returns `false`.
+    pub fn with_residual(
+        &self,
+        residual: &[f64],
+        should_continue: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Gram<'c>, IdentifyError> {
+        let known = self.projection(&self.all_folds())?.products(self, 0, should_continue)?;
+        let other = Gram { residual: Arc::new(residual.to_vec()), projections: Arc::default(), ..self.clone() };
+        other.projection(&other.all_folds())?.take_products(&other, 0, &known, should_continue)?;
+        Ok(other)
+    }
+
     /// Adds candidates as a segment of their own.
     pub fn append(&mut self, sets: Vec<EffectColumns>) {
         let key = self.next_key.fetch_add(1, Ordering::Relaxed);

@@ -173,6 +173,25 @@ impl Projection {
         })
     }
 
+    /// Takes the products of a segment that do not depend on the residual from the same projection with another residual.
+    ///
+    /// # Errors
+    /// [`IdentifyError::Interrupted`] if `should_continue` returns `false`.
+    pub fn take_products(
+        &self,
+        gram: &Gram<'_>,
+        segment: usize,
+        known: &SegmentProducts,
+        should_continue: &(dyn Fn() -> bool + Sync),
+    ) -> Result<(), IdentifyError> {
+        let side = Adjoint::of(&self.training, self.residual.as_ref());
+        let formed = gram.segments[segment].layout.products(&self.training, &side, false, should_continue);
+        let g = formed.ok_or(IdentifyError::Interrupted)?.side.row(0).iter().copied().collect();
+        let products =
+            SegmentProducts { own: known.own.clone(), d: known.d.clone(), g, with_model: known.with_model.clone() };
+        stored(&self.segments, &gram.segments[segment].key, || Ok(Arc::new(products))).map(|_| ())
+    }
+
     /// `Wᵀ [X | y⊥]` over the training rows.
     pub fn side(&self, gram: &Gram<'_>) -> Arc<Adjoint> {
         let formed = || {
