@@ -13,6 +13,7 @@
 //! estimates by their uncertainties.
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use abbe_identify::noise::trends::{TERMS, Trends};
 use abbe_identify::noise::{NoiseSource, PureError};
@@ -22,7 +23,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{ChiSquared, Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
-use super::constants::{MAX_AR_SUM, MIN_POOL, SMOOTHING};
+use super::constants::{MAX_AR_SUM, MIN_POOL, SINGLE, SMOOTHING};
 use super::policy::{NullSource, Policy};
 use crate::candidates::columns::Columns;
 
@@ -65,6 +66,8 @@ fn sign(generator: &mut Pcg64) -> f64 {
 /// Whitened deviations in uninterrupted stretches, and the uncertainty of the noise model.
 struct NoiseDraws {
     pool: Vec<Stretch>,
+    /// The deviations of the pool as blocks of one reading, when they are first drawn.
+    singles: OnceLock<Vec<Single>>,
     spectrum: Spectrum,
     /// Degrees of freedom of the noise variance. `None` if it is not an estimate.
     freedom: Option<f64>,
@@ -78,6 +81,13 @@ struct Stretch {
     trend: Vec<[f64; TERMS]>,
     /// Readings have this number of channels, one after another, each with a trend of its own.
     channels: usize,
+}
+
+/// A whitened deviation as a block of one reading.
+struct Single {
+    value: f64,
+    /// Standard deviation of the trend that it lacks; `None` if it lacks none.
+    share: Option<f64>,
 }
 
 /// The autocorrelation that an inaccurate whitening leaves.
@@ -108,7 +118,7 @@ impl NoiseDraws {
         };
         let estimated = problem.noise.source == NoiseSource::Repeats;
         let freedom = estimated.then_some(pure.freedom as f64);
-        NoiseDraws { pool, spectrum, freedom }
+        NoiseDraws { pool, singles: OnceLock::new(), spectrum, freedom }
     }
 
     fn draw(&self, rows: usize, block: usize, generator: &mut Pcg64) -> Vec<f64> {
@@ -124,6 +134,7 @@ impl NoiseDraws {
     }
 
     /// Draws `rows` deviations from the pool in blocks with random signs. Draws Gaussian noise if the pool is too small.
+    /// Blocks of one reading come from a table, which takes no search for the stretch of each.
     fn blocks(&self, rows: usize, block: usize, generator: &mut Pcg64) -> Vec<f64> {
         let ends: Vec<usize> = (self.pool.iter())
             .scan(0, |end, stretch| {
@@ -134,6 +145,12 @@ impl NoiseDraws {
         let total = ends.last().copied().unwrap_or(0);
         if total < MIN_POOL {
             return (0..rows).map(|_| generator.sample(StandardNormal)).collect();
+        }
+        if block == SINGLE {
+            let of_stretch =
+                |stretch: &Stretch| (0..stretch.values.len()).map(|i| stretch.single(i)).collect::<Vec<_>>();
+            let singles = self.singles.get_or_init(|| self.pool.iter().flat_map(of_stretch).collect());
+            return (0..rows).map(|_| singles[generator.random_range(0..total)].draw(generator)).collect();
         }
         let mut values = Vec::with_capacity(rows + block);
         while values.len() < rows {
@@ -176,6 +193,12 @@ impl Stretch {
         Stretch { values, trend, channels }
     }
 
+    /// A deviation as a block of one reading.
+    fn single(&self, i: usize) -> Single {
+        let share = |trend: &[f64; TERMS]| trend.iter().map(|q| q * q).sum::<f64>().sqrt();
+        Single { value: self.values[i], share: self.trend.get(i).map(share) }
+    }
+
     /// Draws the values of a range with one sign, and a trend of white noise.
     fn draw(&self, range: Range<usize>, values: &mut Vec<f64>, generator: &mut Pcg64) {
         if self.trend.is_empty() {
@@ -183,19 +206,28 @@ impl Stretch {
             values.extend(range.map(|i| sign(generator) * self.values[i]));
             return;
         }
-        let sign = sign(generator);
         if range.len() == 1 {
-            let share = self.trend[range.start].iter().map(|q| q * q).sum::<f64>().sqrt();
-            let of_trend: f64 = generator.sample(StandardNormal);
-            values.push(sign * self.values[range.start] + share * of_trend);
+            values.push(self.single(range.start).draw(generator));
             return;
         }
+        let sign = sign(generator);
         let coefficients: Vec<[f64; TERMS]> =
             (0..self.channels).map(|_| std::array::from_fn(|_| generator.sample(StandardNormal))).collect();
         values.extend(range.map(|i| {
             let of_trend = self.trend[i].iter().zip(&coefficients[i % self.channels]).map(|(q, z)| q * z);
             sign * self.values[i] + of_trend.sum::<f64>()
         }));
+    }
+}
+
+impl Single {
+    /// Draws the deviation with a random sign, and a trend of white noise.
+    fn draw(&self, generator: &mut Pcg64) -> f64 {
+        let deviation = sign(generator) * self.value;
+        match self.share {
+            Some(share) => deviation + share * generator.sample::<f64, _>(StandardNormal),
+            None => deviation,
+        }
     }
 }
 
@@ -362,7 +394,7 @@ mod tests {
                 Stretch::without_trend(noise, trend, 1)
             })
             .collect();
-        let mut draws = NoiseDraws { pool, spectrum: Spectrum::white(), freedom: None };
+        let mut draws = NoiseDraws { pool, singles: OnceLock::new(), spectrum: Spectrum::white(), freedom: None };
         let variance_of_sums = |draws: &NoiseDraws, generator: &mut Pcg64| {
             let values = draws.blocks(400_000, BLOCK, generator);
             let rough = values.windows(2).map(|two| (two[1] - two[0]).powi(2)).sum::<f64>() / (2.0 * 399_999.0);
@@ -372,6 +404,10 @@ mod tests {
         };
         let (slow, rough) = variance_of_sums(&draws, &mut generator);
         assert!((slow - 1.0).abs() < 0.08 && (rough - 1.0).abs() < 0.08, "{slow} {rough}");
+        // Blocks of one reading lack the trend too: without it they have the variance 1 − TERMS/RUN.
+        let singles = draws.blocks(400_000, SINGLE, &mut generator);
+        let variance = singles.iter().map(|value| value * value).sum::<f64>() / 400_000.0;
+        assert!((variance - 1.0).abs() < 0.02, "{variance}");
         draws.pool.iter_mut().for_each(|stretch| stretch.trend.iter_mut().for_each(|terms| *terms = [0.0; TERMS]));
         let (slow, _) = variance_of_sums(&draws, &mut generator);
         assert!(slow < 0.7, "{slow}");
@@ -386,7 +422,7 @@ mod tests {
         let mut generator = Pcg64::seed_from_u64(4);
         let draws = |freedom: Option<f64>, first: f64, u: f64, generator: &mut Pcg64| -> Vec<(f64, f64)> {
             let spectrum = Spectrum { first, u, ..Spectrum::white() };
-            let source = NoiseDraws { pool: Vec::new(), spectrum, freedom };
+            let source = NoiseDraws { pool: Vec::new(), singles: OnceLock::new(), spectrum, freedom };
             (0..DRAWS)
                 .map(|_| {
                     let values = source.draw(ROWS, 1, generator);

@@ -194,8 +194,8 @@ fn curve(from: f64, to: f64, intervals: usize) -> Shape {
     Shape::Curve(Curve { from, to, intervals, closed: false })
 }
 
-/// Number of entries of the basis functions of detectors from which on they are a batch: 32 MB.
-const MAX_ENTRIES: usize = 8_000_000;
+/// Number of entries of the basis functions of detectors from which on they are a batch: 128 MB.
+const MAX_ENTRIES: usize = 32_000_000;
 /// Detectors whose columns are formed together.
 const AT_ONCE: usize = 64;
 
