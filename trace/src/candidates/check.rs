@@ -116,6 +116,33 @@ fn gains_are_those_of_least_squares() {
     }
 }
 
+/// With another residual the gains are those of products that are formed for it, on all readings and without one fold.
+#[test]
+fn products_serve_another_residual() {
+    let (problem, beta) = problem(&[0.4]);
+    let columns = Columns::new(&problem, &beta);
+    let (model, residual) = model(&columns, &beta);
+    let sets = candidates(&problem, &columns, 211);
+    let rank = model.ncols();
+    let of = |residual: &[f64]| {
+        let prior = PriorGram { base: Mat::zeros(rank, rank), base_y: vec![0.0; rank] };
+        Gram::new(&columns, sets.clone(), Arc::new(model.clone()), residual, prior)
+    };
+    let other: Vec<f64> = residual.iter().enumerate().map(|(i, r)| 0.3 * r + (0.7 * i as f64).sin()).collect();
+    let (known, formed) = (of(&residual).with_residual(&other, &|| true).unwrap(), of(&other));
+    let all: Vec<usize> = (0..columns.fold_rows.len()).collect();
+    for folds in [all.clone(), all[1..].to_vec()] {
+        let gains = |gram: &Gram<'_>| TrainedModel::new(gram, &[], &folds).unwrap().gains(&|_| true).unwrap();
+        let (found, expected) = (gains(&known), gains(&formed));
+        let greatest = expected.iter().map(|gain| gain.gain).fold(0.0, f64::max);
+        assert!(greatest > 1.0 && found.len() == sets.len());
+        for (k, (found, expected)) in found.iter().zip(&expected).enumerate() {
+            assert_eq!(found.freedom, expected.freedom, "{k}");
+            assert!((found.gain - expected.gain).abs() < 1e-9 * greatest, "{k}: {} {}", found.gain, expected.gain);
+        }
+    }
+}
+
 /// Candidates that come in parts, with null draws that are kept, have the gains and the best null scores of all candidates
 /// together.
 #[test]
