@@ -12,7 +12,7 @@ mod median;
 pub mod null_space;
 pub mod parallel;
 pub mod power;
-pub mod products;
+pub(crate) mod products;
 pub mod rank;
 pub mod ranking;
 pub mod reduction;

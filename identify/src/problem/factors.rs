@@ -33,7 +33,7 @@ impl Problem {
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
-    pub fn products(&self, beta: &[f64]) -> Result<Vec<Products>, IdentifyError> {
+    pub(crate) fn products(&self, beta: &[f64]) -> Result<Vec<Products>, IdentifyError> {
         self.sums_of_folds(beta, BLOCKS_OF_PRODUCTS)
     }
 
