@@ -2,6 +2,7 @@
 //! misread.
 
 use abbe_model::axis::AxisKind;
+use abbe_model::session::limits::MIN_UM;
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
 use nalgebra::Vector3;
@@ -62,7 +63,8 @@ pub(super) fn spread_mm2(problem: &Problem) -> Option<f64> {
         count += points.len();
     }
     let spread = sum / count.max(1) as f64;
-    (spread > 0.0 && spread.is_finite()).then_some(spread)
+    // Equal positions scatter about their mean by its rounding.
+    (spread > (MIN_UM * 1e-3).powi(2) && spread.is_finite()).then_some(spread)
 }
 
 /// The misfit of the nominal machine: see [`super::nominal_misfit`].

@@ -49,6 +49,18 @@ fn poses_that_belong_to_the_robot_are_not_contradicted() {
     assert!(told.explained_variance.unwrap() > 0.9999, "{told:?}");
 }
 
+/// Positions that do not scatter have no variance that a model could explain, whatever the rounding of their mean.
+#[test]
+fn one_pose_read_again_and_again_contradicts_nothing() {
+    let Some(mut session) = ur10("one_pose_read_again_and_again_contradicts_nothing", |text| text) else {
+        return;
+    };
+    let readings = session.tests[0].readings.as_ref().unwrap();
+    session.tests[0].readings = Some(Arc::new(readings.of_rows(&[1; 12])));
+    let told = fitted(&session).unwrap().plausibility;
+    assert!(told.explained_variance.is_none() && told.conflicts.is_empty(), "{told:?}");
+}
+
 #[test]
 fn metres_for_millimetres_are_named() {
     let test = "metres_for_millimetres_are_named";
