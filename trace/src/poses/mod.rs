@@ -158,11 +158,17 @@ pub(super) fn search(
             }
             complete((problem, fit), &mut without, &library, options, false, limits, interrupt)
         });
-        let single = PoseSearch::of(without, &library, ended)?;
-        // An interrupted repetition says nothing of what single effects could reach.
-        chosen.interrupted = single.interrupted;
-        if !single.interrupted && !chosen.predicts_better_than(&single) {
-            chosen = single;
+        match PoseSearch::of(without, &library, ended) {
+            // A model that cannot be fitted takes no place of one that can.
+            Err(IdentifyError::NoConvergence { .. }) => {}
+            found => {
+                let single = found?;
+                // An interrupted repetition says nothing of what single effects could reach.
+                chosen.interrupted = single.interrupted;
+                if !single.interrupted && !chosen.predicts_better_than(&single) {
+                    chosen = single;
+                }
+            }
         }
     }
     if !chosen.has_families() {
