@@ -221,16 +221,15 @@ impl FoldEquations {
     /// # Errors
     /// If the equations are not positive definite.
     pub fn held_out_at_present(&self, problem: &Problem) -> Result<Vec<f64>, IdentifyError> {
-        let (variance, precisions) = self.present(problem);
-        let of_folds = parallel::map(self.folds.len(), &|k| Ok(self.residual_without(k, variance, &precisions)?.0));
+        let precisions = self.precisions(problem);
+        let of_folds =
+            parallel::map(self.folds.len(), &|k| Ok(self.residual_without(k, PRESENT_VARIANCE, &precisions)?.0));
         of_folds.into_iter().collect()
     }
 
-    /// Variance of a reading and precision of each family at the present scales and noise of the problem. Rows whitened
-    /// with the present noise, which includes the inflation, have the unit variance.
-    fn present(&self, problem: &Problem) -> (f64, Vec<f64>) {
-        let families = self.equations.families.iter();
-        (1.0, families.map(|own| self.precision(own[0], problem)).collect())
+    /// The precision of each family at the present scales of the problem.
+    fn precisions(&self, problem: &Problem) -> Vec<f64> {
+        self.equations.families.iter().map(|own| self.precision(own[0], problem)).collect()
     }
 
     /// For each fold, the sum of squares of its residual under the model without it, and the sum of its variances from
@@ -307,6 +306,8 @@ impl FoldEquations {
     }
 }
 
+/// Variance of a reading at the present noise of the problem, which whitens the rows and includes the inflation.
+const PRESENT_VARIANCE: f64 = 1.0;
 /// Precision of a family of a wide scale: the physical size.
 const WIDE_PRECISION: f64 = 1.0;
 /// Precision of a family from which the estimation starts: a scale of a hundredth of the physical size.

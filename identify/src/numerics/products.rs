@@ -1,7 +1,8 @@
 //! The normal equations of a least-squares problem, built from a stream of rows.
 //!
-//! `[J | r]ᵀ[J | r]` takes about a third of the operations of the triangular factor, and squares the condition
-//! number. It serves where priors determine what the readings do not, and where models are compared, not where a rank is decided.
+//! `[J | r]ᵀ[J | r]` takes about a third of the operations of the triangular factor, and squares the condition number.
+//! It serves where priors determine what the readings do not, and where models are compared. It does not serve the
+//! decision on a rank.
 
 use std::borrow::Cow;
 

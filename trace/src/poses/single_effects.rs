@@ -168,8 +168,8 @@ fn ranked(library: &Library<'_>, found: &PoseModel, interrupt: Interrupt<'_>) ->
     Ok(Ranked { best, detectable })
 }
 
-/// The candidates other than the accepted effects and their scores in a residual, the largest first, and the number of candidates
-/// that are observable beside the declared parameters.
+/// The candidates other than the accepted effects with their scores in a residual, the largest first, and the number of
+/// candidates that are observable beside the declared parameters.
 fn scored(
     library: &Library<'_>,
     effects: &[AcceptedEffect],

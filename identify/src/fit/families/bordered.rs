@@ -12,7 +12,7 @@ use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_uppe
 use faer::prelude::Solve;
 use faer::{Mat, Par, Side};
 
-use super::FoldEquations;
+use super::{FoldEquations, PRESENT_VARIANCE};
 use crate::error::IdentifyError;
 use crate::numerics::parallel;
 use crate::problem::Problem;
@@ -46,8 +46,7 @@ impl FoldEquations {
     /// # Errors
     /// If the equations are not positive definite.
     pub fn bordered(&self, shared: &[usize], folds: bool, problem: &Problem) -> Result<Bordered<'_>, IdentifyError> {
-        let (variance, precisions) = self.present(problem);
-        self.bordered_at(shared, folds, variance, &precisions)
+        self.bordered_at(shared, folds, PRESENT_VARIANCE, &self.precisions(problem))
     }
 
     fn bordered_at(
