@@ -170,9 +170,14 @@ fn detrended(coefficients: &[f64], lengths: &BTreeMap<usize, usize>) -> ([f64; M
             coefficients.iter().enumerate().filter(|(k, _)| *k < t).map(|(k, a)| a * response[t - 1 - k]).sum();
     }
     let power: f64 = response.iter().map(|r| r * r).sum();
-    let correlation: Vec<f64> = (0..longest)
+    // Beyond the order of the process its autocorrelations follow from those before (Yule–Walker).
+    let mut correlation: Vec<f64> = (0..=MAX_ORDER)
         .map(|lag| response[lag..].iter().zip(&response).map(|(a, b)| a * b).sum::<f64>() / power)
         .collect();
+    for lag in correlation.len()..longest {
+        let terms = coefficients.iter().enumerate();
+        correlation.push(terms.map(|(k, a)| a * correlation[lag - 1 - k]).sum());
+    }
     let process = std::array::from_fn(|lag| correlation[lag]);
     let mut shown = [0.0; MAX_ORDER + 1];
     let mut total = 0.0;
@@ -188,8 +193,12 @@ fn detrended(coefficients: &[f64], lengths: &BTreeMap<usize, usize>) -> ([f64; M
         let q = trend_terms(&times);
         let gq: Vec<[f64; TERMS]> = (0..n)
             .map(|t| {
-                let along = |i: usize| (0..n).map(|s| correlation[t.abs_diff(s)] * q[s][i]).sum();
-                std::array::from_fn(along)
+                let mut along = [0.0; TERMS];
+                for (s, q) in q.iter().enumerate() {
+                    let correlation = correlation[t.abs_diff(s)];
+                    along.iter_mut().zip(q).for_each(|(along, q)| *along += correlation * q);
+                }
+                along
             })
             .collect();
         let qgq: [[f64; TERMS]; TERMS] =
