@@ -264,7 +264,8 @@ fn deviations(
 /// Least share of the variance that the trends must leave.
 const MIN_VARIANCE_SHARE: f64 = 0.05;
 
-/// The position of a reading as integers that are equal for repeats: axis positions and directions of travel.
+/// The position of a reading as integers that are equal for repeats: axis positions and directions of travel, without
+/// those that are equal in all rows.
 struct RepeatKeys {
     columns: usize,
     keys: Vec<i64>,
@@ -272,14 +273,17 @@ struct RepeatKeys {
 
 impl RepeatKeys {
     fn of(readings: &Readings) -> RepeatKeys {
-        let directions = directions(readings);
-        let columns = readings.positions.len() + 1;
+        let directions = if readings.run.is_empty() { Vec::new() } else { directions(readings) };
+        // Positions agree to 0.1 µm or 10⁻⁴ rad.
+        let key = |position: f64| (position * 1e4).round() as i64;
+        let differs = |column: &&Vec<f64>| column.iter().any(|position| key(*position) != key(column[0]));
+        let moving: Vec<&Vec<f64>> = readings.positions.iter().filter(differs).collect();
+        let has_directions = directions.iter().any(|direction| *direction != directions[0]);
+        let columns = moving.len() + usize::from(has_directions);
         let mut keys = Vec::with_capacity(readings.rows() * columns);
-        for (row, direction) in directions.iter().enumerate() {
-            // Positions agree to 0.1 µm or 10⁻⁴ rad.
-            let positions = readings.positions.iter();
-            keys.extend(positions.map(|column| (column[row] * 1e4).round() as i64));
-            keys.push(if readings.run.is_empty() { 0 } else { *direction });
+        for row in 0..readings.rows() {
+            keys.extend(moving.iter().map(|column| key(column[row])));
+            keys.extend(has_directions.then(|| directions[row]));
         }
         RepeatKeys { columns, keys }
     }

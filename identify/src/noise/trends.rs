@@ -1,5 +1,8 @@
 //! The trend that is removed from every run before repeats are compared.
 
+use std::collections::BTreeMap;
+use std::ops::Range;
+
 use abbe_model::session::readings::Readings;
 
 /// Terms of the trend of a long run: constant, slope, curvature, and sine and cosine of one cycle over the run.
@@ -51,54 +54,76 @@ pub fn trend_terms(times: &[f64]) -> Vec<[f64; TERMS]> {
     q
 }
 
+/// The terms of the trend of a run, one row per reading; zero for excluded rows.
+type Terms = Vec<[f64; TERMS]>;
+
 /// The trends of the runs of a test.
 pub struct Trends {
-    /// The run of each row.
-    run: Vec<usize>,
-    /// The terms of that run's trend at each row; zero for excluded rows.
-    terms: Vec<[f64; TERMS]>,
-    /// The rows of each run that are not excluded.
-    rows: Vec<Vec<usize>>,
+    /// The rows of each run, in order.
+    runs: Vec<Range<usize>>,
+    /// For each run, which of the terms are its own.
+    terms_of_run: Vec<usize>,
+    /// Whole runs of one length share their terms.
+    terms: Vec<Terms>,
 }
 
 impl Trends {
     /// The trends over the rows that are not excluded. Readings without runs have no trend.
     pub fn of(readings: &Readings, kept: impl Fn(usize) -> bool) -> Trends {
-        let mut trends =
-            Trends { run: vec![0; readings.rows()], terms: vec![[0.0; TERMS]; readings.rows()], rows: Vec::new() };
+        let mut trends = Trends { runs: Vec::new(), terms_of_run: Vec::new(), terms: Vec::new() };
         if readings.run.is_empty() {
             return trends;
         }
-        for (number, run) in readings.runs().into_iter().enumerate() {
-            trends.run[run.clone()].fill(number);
-            let rows: Vec<usize> = run.filter(|row| kept(*row)).collect();
-            if !rows.is_empty() {
-                let times: Vec<f64> = rows.iter().map(|row| *row as f64).collect();
-                for (row, terms) in rows.iter().zip(trend_terms(&times)) {
-                    trends.terms[*row] = terms;
+        let mut of_length: BTreeMap<usize, usize> = BTreeMap::new();
+        for run in readings.runs() {
+            let rows: Vec<usize> = run.clone().filter(|row| kept(*row)).collect();
+            let is_whole = rows.len() == run.len();
+            let number = match of_length.get(&run.len()).filter(|_| is_whole) {
+                Some(known) => *known,
+                None => {
+                    let times: Vec<f64> = rows.iter().map(|row| *row as f64).collect();
+                    let mut terms = vec![[0.0; TERMS]; run.len()];
+                    if !rows.is_empty() {
+                        for (row, of_row) in rows.iter().zip(trend_terms(&times)) {
+                            terms[row - run.start] = of_row;
+                        }
+                    }
+                    trends.terms.push(terms);
+                    trends.terms.len() - 1
                 }
+            };
+            if is_whole {
+                of_length.insert(run.len(), number);
             }
-            trends.rows.push(rows);
+            trends.terms_of_run.push(number);
+            trends.runs.push(run);
         }
         trends
     }
 
+    /// The run of a row; `None` without runs.
+    fn run(&self, row: usize) -> Option<usize> {
+        let number = self.runs.partition_point(|run| run.end <= row);
+        (number < self.runs.len()).then_some(number)
+    }
+
     /// The terms of the trend at a row.
     pub fn terms_at(&self, row: usize) -> [f64; TERMS] {
-        self.terms[row]
+        self.run(row).map_or([0.0; TERMS], |run| self.terms[self.terms_of_run[run]][row - self.runs[run].start])
     }
 
     /// Residuals without the trend of each run and channel.
     pub fn detrend(&self, residual: &[f64], channels: usize) -> Vec<f64> {
         let mut level = residual.to_vec();
-        for rows in &self.rows {
+        for (run, number) in self.runs.iter().zip(&self.terms_of_run) {
+            // The residual of an excluded row may be no number.
+            let rows = || run.clone().zip(&self.terms[*number]).filter(|(_, terms)| **terms != [0.0; TERMS]);
             for channel in 0..channels {
                 let at = |row: usize| row * channels + channel;
                 let along: [f64; TERMS] =
-                    std::array::from_fn(|i| rows.iter().map(|row| residual[at(*row)] * self.terms[*row][i]).sum());
-                for row in rows {
-                    let terms = along.iter().zip(&self.terms[*row]);
-                    level[at(*row)] -= terms.map(|(a, q)| a * q).sum::<f64>();
+                    std::array::from_fn(|i| rows().map(|(row, terms)| residual[at(row)] * terms[i]).sum());
+                for (row, terms) in rows() {
+                    level[at(row)] -= along.iter().zip(terms).map(|(a, q)| a * q).sum::<f64>();
                 }
             }
         }
@@ -111,13 +136,13 @@ impl Trends {
         let repeats = group.len() as f64;
         let mut own = 0.0;
         // The trends' part of Σ_ts: for each run, the squared norm of the sum of its rows' terms.
-        let mut sums: Vec<(usize, [f64; TERMS])> = Vec::new();
+        let mut sums: Vec<(Option<usize>, [f64; TERMS])> = Vec::new();
         for row in group {
-            let terms = &self.terms[*row];
+            let (run_of_row, terms) = (self.run(*row), self.terms_at(*row));
             own += terms.iter().map(|q| q * q).sum::<f64>();
-            match sums.iter_mut().find(|(run, _)| *run == self.run[*row]) {
-                Some((_, sum)) => sum.iter_mut().zip(terms).for_each(|(sum, q)| *sum += q),
-                None => sums.push((self.run[*row], *terms)),
+            match sums.iter_mut().find(|(run, _)| *run == run_of_row) {
+                Some((_, sum)) => sum.iter_mut().zip(&terms).for_each(|(sum, q)| *sum += q),
+                None => sums.push((run_of_row, terms)),
             }
         }
         let of_trends: f64 = sums.iter().flat_map(|(_, sum)| sum).map(|q| q * q).sum();
@@ -154,5 +179,31 @@ mod tests {
             assert!((count - f64::from(terms)).abs() < 1e-12, "{readings}: {count}");
             assert!(few.iter().all(|q| q[terms as usize..].iter().all(|q| *q == 0.0)));
         }
+    }
+
+    /// Runs of one length share their terms, wherever they begin. A run with an excluded row has its own, zero there.
+    #[test]
+    fn whole_runs_of_one_length_share_their_terms() {
+        let run: Vec<i64> = [1; 30].into_iter().chain([2; 30]).chain([3; 12]).chain([4; 30]).collect();
+        let readings = Readings { positions: vec![vec![0.0; run.len()]], run, channels: 1, ..Readings::default() };
+        let trends = Trends::of(&readings, |row| row != 75);
+        assert_eq!((&trends.terms_of_run[..], trends.terms.len()), (&[0, 0, 1, 2][..], 3));
+        let alone = |rows: std::ops::Range<usize>| {
+            let rows: Vec<usize> = rows.filter(|row| *row != 75).collect();
+            let terms = trend_terms(&rows.iter().map(|row| *row as f64).collect::<Vec<_>>());
+            rows.into_iter().zip(terms).collect::<Vec<_>>()
+        };
+        for rows in [0..30, 30..60, 60..72, 72..102] {
+            for (row, terms) in alone(rows) {
+                assert_eq!(trends.terms_at(row), terms, "{row}");
+            }
+        }
+        assert_eq!(trends.terms_at(75), [0.0; TERMS]);
+        // A residual that is one of the terms vanishes; that of the excluded row stays, even if it is no number.
+        let residual: Vec<f64> = (0..102).map(|row| if row == 75 { f64::NAN } else { 7.0 }).collect();
+        let level = trends.detrend(&residual, 1);
+        assert!(level[75].is_nan() && (0..102).filter(|row| *row != 75).all(|row| level[row].abs() < 1e-12));
+        // Without runs there is no trend.
+        assert_eq!(Trends::of(&Readings::default(), |_| true).terms_at(0), [0.0; TERMS]);
     }
 }
