@@ -10,9 +10,10 @@ use super::constants::SINGLE;
 use super::remainder::{self, Structure};
 use super::start::Start;
 use super::state::SearchState;
+use crate::TraceOptions;
 use crate::candidates::columns::Columns;
+use crate::null::Draws;
 use crate::trace::null_draw_count;
-use crate::{TraceOptions, null};
 
 /// The refitted model with the selected effects, and the remaining structure.
 pub(super) struct RefittedModel {
@@ -95,9 +96,10 @@ pub(super) fn structure(
     seed: u64,
     should_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Structure, IdentifyError> {
-    let columns = Columns::new(problem, &fit.beta);
+    let columns = Columns::of_readings(problem);
     let start = Start::of(problem, &columns, fit)?;
     let count = null_draw_count(options);
-    let draws = null::draws(problem, &columns, &fit.residuals, &start.residual, count, SINGLE, seed);
-    remainder::structure(problem, &columns, &start, draws, should_continue)
+    let (residuals, whitened, block) = (&fit.residuals, &start.residual, SINGLE);
+    let draws = Draws { problem, columns: &columns, residuals, whitened, count, block, seed, progress: None };
+    remainder::structure(problem, &start, &draws, should_continue)
 }

@@ -26,29 +26,56 @@ use rand_pcg::Pcg64;
 use super::constants::{MAX_AR_SUM, MIN_POOL, SINGLE, SMOOTHING};
 use super::policy::{NullSource, Policy};
 use crate::candidates::columns::Columns;
+use crate::candidates::gram::DrawSource;
+use crate::progress::Progress;
 
-/// Null draws, each over the whitened rows in fold order, in blocks of `block` readings. A draw is formed when it is
-/// taken: a hundred thousand readings times two hundred draws are 160 MB.
-pub fn draws<'d>(
-    problem: &'d Problem,
-    columns: &'d Columns<'_>,
-    residuals: &[Vec<f64>],
-    whitened: &'d [f64],
-    count: usize,
-    block: usize,
-    seed: u64,
-) -> impl ExactSizeIterator<Item = Vec<f64>> + Send + use<'d> {
-    let mut generator = Pcg64::seed_from_u64(seed ^ 0x6e75_6c6c);
-    let mut draw: Box<dyn FnMut() -> Vec<f64> + Send + 'd> = if Policy::of(problem).null == NullSource::SignFlips {
-        let pose_of_row = &problem.folds.pose_of_row;
-        let poses: Vec<usize> =
-            columns.origin_of_rows().into_iter().map(|(test, row, _)| pose_of_row[test][row]).collect();
-        Box::new(move || sign_flipped(&poses, whitened, &mut generator))
-    } else {
-        let source = NoiseDraws::of(problem, residuals);
-        Box::new(move || columns.placed(&source.draw(columns.rows(), block, &mut generator)))
-    };
-    (0..count).map(move |_| draw())
+/// Null draws from one message of progress to the next.
+const BETWEEN_NEWS: usize = 16;
+
+/// Null draws, each over the whitened rows in fold order. A draw is formed when it is taken: a hundred thousand readings
+/// times two hundred draws are 160 MB.
+pub struct Draws<'d> {
+    /// What was fitted.
+    pub problem: &'d Problem,
+    /// Its rows.
+    pub columns: &'d Columns<'d>,
+    /// The residuals with the pure error, mm, test by test.
+    pub residuals: &'d [Vec<f64>],
+    /// The whitened residual.
+    pub whitened: &'d [f64],
+    /// Number of draws.
+    pub count: usize,
+    /// Readings of a block.
+    pub block: usize,
+    /// Seed.
+    pub seed: u64,
+    /// Receives how many are formed.
+    pub progress: Option<&'d (dyn Fn(Progress) -> bool + Sync)>,
+}
+
+impl DrawSource for Draws<'_> {
+    fn draws(&self) -> Box<dyn ExactSizeIterator<Item = Vec<f64>> + Send + '_> {
+        let Draws { problem, columns, whitened, block, .. } = *self;
+        let mut generator = Pcg64::seed_from_u64(self.seed ^ 0x6e75_6c6c);
+        let mut draw: Box<dyn FnMut() -> Vec<f64> + Send + '_> = match Policy::of(problem).null {
+            NullSource::SignFlips => {
+                let pose_of_row = &problem.folds.pose_of_row;
+                let origins = columns.origin_of_rows().into_iter();
+                let poses: Vec<usize> = origins.map(|(test, row, _)| pose_of_row[test][row]).collect();
+                Box::new(move || sign_flipped(&poses, whitened, &mut generator))
+            }
+            NullSource::Repeats => {
+                let source = NoiseDraws::of(problem, self.residuals);
+                Box::new(move || columns.placed(&source.draw(columns.rows(), block, &mut generator)))
+            }
+        };
+        Box::new((0..self.count).map(move |formed| {
+            if let Some(progress) = self.progress.filter(|_| formed > 0 && formed % BETWEEN_NEWS == 0) {
+                progress(Progress::NullDraws(formed, self.count));
+            }
+            draw()
+        }))
+    }
 }
 
 /// The residual with a random sign for each pose. `poses` are the poses of the values: the readings of several targets at

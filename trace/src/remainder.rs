@@ -21,7 +21,7 @@ use super::constants::STRUCTURED;
 use super::start::Start;
 use crate::candidates::columns::{Columns, EffectColumns};
 use crate::candidates::gain::TrainedModel;
-use crate::candidates::gram::Gram;
+use crate::candidates::gram::{DrawSource, Gram};
 
 /// Structure in a residual.
 #[derive(Clone, Debug)]
@@ -230,30 +230,29 @@ impl<'d> Batch<'d> {
 /// If products are not finite, or [`IdentifyError::Interrupted`] if `should_continue` returns `false`.
 pub(super) fn structure(
     problem: &Problem,
-    columns: &Columns<'_>,
     start: &Start,
-    null: impl ExactSizeIterator<Item = Vec<f64>> + Send,
+    null: &dyn DrawSource,
     should_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Structure, IdentifyError> {
-    structure_by_batches(problem, columns, start, null, MAX_ENTRIES, should_continue)
+    structure_by_batches(problem, start, null, MAX_ENTRIES, should_continue)
 }
 
 /// The test with batches of about `max_entries` entries.
 fn structure_by_batches(
     problem: &Problem,
-    columns: &Columns<'_>,
     start: &Start,
-    null: impl ExactSizeIterator<Item = Vec<f64>> + Send,
+    null: &dyn DrawSource,
     max_entries: usize,
     should_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<Structure, IdentifyError> {
+    let columns = &Columns::of_readings(problem);
     let detectors = detectors(problem);
     let mut batch = Batch::of(&detectors, columns, max_entries);
-    // In a long session the detectors come in batches, for which the null draws are kept.
+    // In a long session the detectors come in batches, all with the same null draws.
     let in_batches = !batch.rest.is_empty();
     let sets = if in_batches { Vec::new() } else { std::mem::take(&mut batch.sets) };
     let mut first = Gram::new(columns, sets, start.model.clone(), &start.residual, start.prior());
-    first.take_draws(null, in_batches, should_continue)?;
+    first.take_draws(null, in_batches.then_some(0), should_continue)?;
     let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
     let mut best: Option<(&Detector, f64, f64)> = None;
     let mut null_best = vec![f64::NEG_INFINITY; first.draws()];
@@ -302,6 +301,7 @@ mod tests {
     use abbe_identify::fit::{Fit, prepare};
 
     use super::*;
+    use crate::candidates::gram::Given;
 
     fn measured() -> (Problem, Fit) {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
@@ -311,12 +311,10 @@ mod tests {
     #[test]
     fn a_structure_test_can_be_interrupted() {
         let (problem, fit) = measured();
-        let columns = Columns::new(&problem, &fit.beta);
-        let start = Start::of(&problem, &columns, &fit).unwrap();
-        let tested = |should_continue: bool| {
-            let draws = std::iter::repeat_n(vec![0.0; start.residual.len()], 3);
-            structure(&problem, &columns, &start, draws, &|| should_continue)
-        };
+        let start = Start::of(&problem, &Columns::of_readings(&problem), &fit).unwrap();
+        let rows = start.residual.len();
+        let draws = Given(3, move |_| vec![0.0; rows]);
+        let tested = |should_continue: bool| structure(&problem, &start, &draws, &|| should_continue);
         assert!(matches!(tested(false), Err(IdentifyError::Interrupted)));
         // One of four: no draw has structure.
         assert_eq!(tested(true).unwrap().p_value, 0.25);
@@ -326,12 +324,11 @@ mod tests {
     #[test]
     fn batches_of_detectors_find_the_same_structure() {
         let (problem, fit) = measured();
-        let columns = Columns::new(&problem, &fit.beta);
-        let start = Start::of(&problem, &columns, &fit).unwrap();
-        let draw = |k: usize| (0..start.residual.len()).map(|i| ((i * (2 * k + 3)) as f64).sin()).collect();
-        let found = |max_entries: usize| {
-            structure_by_batches(&problem, &columns, &start, (0..9).map(draw), max_entries, &|| true).unwrap()
-        };
+        let start = Start::of(&problem, &Columns::of_readings(&problem), &fit).unwrap();
+        let rows = start.residual.len();
+        let draw = move |k: usize| (0..rows).map(|i| ((i * (2 * k + 3)) as f64).sin()).collect();
+        let draws = Given(9, draw);
+        let found = |max_entries: usize| structure_by_batches(&problem, &start, &draws, max_entries, &|| true).unwrap();
         let (together, in_batches) = (found(MAX_ENTRIES), found(1));
         // The undeclared harmonic of the table is larger than any of the draws.
         assert_eq!((together.p_value, in_batches.p_value), (0.1, 0.1));

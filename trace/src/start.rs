@@ -53,12 +53,12 @@ impl Start {
         beta: &[f64],
         sigma_mm: f64,
     ) -> Result<UnwhitenedModel, IdentifyError> {
-        let rows = columns.unwhitened_model_rows(beta)?;
-        let parameters = beta.len();
-        let base = rows.as_ref().subcols(0, parameters) * &self.to_parameters;
+        let (mut model, mut residual) = columns.unwhitened_model_rows(beta, &self.to_parameters)?;
+        model.col_iter_mut().flat_map(|column| column.iter_mut()).for_each(|value| *value /= sigma_mm);
+        residual.iter_mut().for_each(|value| *value /= sigma_mm);
         Ok(UnwhitenedModel {
-            model: Mat::from_fn(base.nrows(), base.ncols(), |i, j| base[(i, j)] / sigma_mm),
-            residual: (0..rows.nrows()).map(|i| rows[(i, parameters)] / sigma_mm).collect(),
+            model,
+            residual,
             folds: columns.unwhitened_folds(),
             units: columns.unwhitened_units(),
             sigma_mm,

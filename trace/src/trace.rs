@@ -13,12 +13,13 @@ use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 
 use crate::candidates::columns::{Columns, EffectColumns};
-use crate::candidates::gram::Gram;
+use crate::candidates::gram::{DrawSource, Gram, MAX_KEPT_DRAWS};
 use crate::constants::{BLOCK, MAX_AT_THE_SAME_TIME, SINGLE};
 use crate::implausible::Contradicted;
 use crate::interrupt::Interrupt;
 use crate::judge::RefittedModel;
 use crate::noise_model::estimate_noise_model;
+use crate::null::Draws;
 use crate::policy::{Policy, SIGNIFICANCE};
 use crate::progress::Progress;
 use crate::remainder::Structure;
@@ -26,7 +27,7 @@ use crate::result::PosesEnded;
 use crate::search::{SearchRecord, search_and_refit};
 use crate::start::Start;
 use crate::state::SearchState;
-use crate::{alias, judge, neighbours, null, poses, remainder, result, screening};
+use crate::{alias, judge, neighbours, poses, remainder, result, screening};
 
 /// Options of a trace.
 #[derive(Clone, Debug)]
@@ -296,25 +297,21 @@ fn trace_or_interrupted(
         };
         return result::outcome_of_poses(problem, before_fit, found, ended);
     }
-    let columns = Columns::new(problem, &before_fit.beta);
-    let start = Start::of(problem, &columns, before_fit)?;
+    let readings = Columns::of_readings(problem);
+    let start = Start::of(problem, &readings, before_fit)?;
     interrupt.check()?;
     let null = |block: usize| {
-        let (count, seed) = (null_draw_count(options), options.seed);
-        let draws = null::draws(problem, &columns, pure, &start.residual, count, block, seed);
-        let told = move |(formed, draw): (usize, Vec<f64>)| {
-            if formed > 0 && formed % DRAWS_BETWEEN_NEWS == 0 {
-                progress(Progress::NullDraws(formed, count));
-            }
-            draw
-        };
-        draws.enumerate().map(told)
+        let (count, seed, progress) = (null_draw_count(options), options.seed, Some(progress));
+        let (columns, whitened) = (&readings, start.residual.as_slice());
+        Draws { problem, columns, residuals: pure, whitened, count, block, seed, progress }
     };
+    let (singles, blocks) = (null(SINGLE), null(BLOCK));
     let should_continue = || interrupt.check().is_ok();
-    let structure_before = || remainder::structure(problem, &columns, &start, null(SINGLE), &should_continue);
+    let structure_before = || remainder::structure(problem, &start, &singles, &should_continue);
     let structure_before = || policy.tests_structure.then(structure_before).transpose();
     // In a long session the arrays of the structure test are freed before those of the library are formed.
-    let tested = (columns.rows() > MAX_AT_THE_SAME_TIME).then(structure_before);
+    let tested = (readings.rows() > MAX_AT_THE_SAME_TIME).then(structure_before);
+    let columns = Columns::new(problem, &before_fit.beta);
     let searched = screening::searched_candidates(problem, &columns, options)?;
     let candidate_count = searched.len();
     progress(Progress::Screening(candidate_count));
@@ -323,7 +320,7 @@ fn trace_or_interrupted(
     let gram = || {
         let mut gram = Gram::new(&columns, column_sets, start.model.clone(), &start.residual, start.prior());
         gram.prepare(&[], &should_continue)?;
-        gram.take_draws(null(BLOCK), true, &should_continue)?;
+        gram.take_draws(&blocks, Some(MAX_KEPT_DRAWS), &should_continue)?;
         Ok::<_, IdentifyError>(gram)
     };
     let (structure_before, gram) = match tested {
@@ -408,12 +405,10 @@ fn structure_of_poses(
     let columns = Columns::new(problem, &fit.beta);
     let start = Start::of(problem, &columns, fit)?;
     let (count, seed) = (null_draw_count(options), options.seed.wrapping_add(2));
-    let draws = null::draws(problem, &columns, &fit.residuals, &start.residual, count, SINGLE, seed);
-    Ok(neighbours::structure(problem, &columns, start.model.as_ref().as_ref(), &start.residual, draws))
+    let (residuals, whitened, block) = (&fit.residuals, &start.residual, SINGLE);
+    let draws = Draws { problem, columns: &columns, residuals, whitened, count, block, seed, progress: None };
+    Ok(neighbours::structure(problem, &columns, start.model.as_ref().as_ref(), &start.residual, draws.draws()))
 }
-
-/// Null draws from one message of progress to the next.
-const DRAWS_BETWEEN_NEWS: usize = 16;
 
 /// The number of null draws: the requested number, but at least as many as the significance level needs.
 pub(crate) fn null_draw_count(options: &TraceOptions) -> usize {

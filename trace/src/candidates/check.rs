@@ -12,7 +12,7 @@ use faer::linalg::solvers::SolveLstsq;
 
 use super::columns::{Columns, EffectColumns};
 use super::gain::TrainedModel;
-use super::gram::{Gram, PriorGram};
+use super::gram::{Given, Gram, PriorGram};
 use super::library;
 use super::tuned::TunedChannel;
 
@@ -143,8 +143,8 @@ fn products_serve_another_residual() {
     }
 }
 
-/// Candidates that come in parts, with null draws that are kept, have the gains and the best null scores of all candidates
-/// together.
+/// Candidates that come in parts, with null draws that are kept or formed again, have the gains and the best null scores of
+/// all candidates together.
 #[test]
 fn candidates_in_parts_have_the_scores_of_all_together() {
     const DRAWS: usize = 5;
@@ -155,7 +155,9 @@ fn candidates_in_parts_have_the_scores_of_all_together() {
     let sets = candidates(&problem, &columns, 197);
     let rank = model.ncols();
     let prior = || PriorGram { base: Mat::zeros(rank, rank), base_y: vec![0.0; rank] };
-    let draw = |k: usize| -> Vec<f64> { (0..residual.len()).map(|i| ((i * (k + 3) + k) as f64).sin()).collect() };
+    let rows = residual.len();
+    let draw = move |k: usize| -> Vec<f64> { (0..rows).map(|i| ((i * (k + 3) + k) as f64).sin()).collect() };
+    let draws = Given(DRAWS, draw);
     let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
     let scores = |gram: &Gram<'_>| {
         let trained = TrainedModel::new(gram, &[], &folds).unwrap();
@@ -163,22 +165,24 @@ fn candidates_in_parts_have_the_scores_of_all_together() {
         (gains, trained.null_best(&[], &vec![0.0; gram.candidates()], 1.0).unwrap())
     };
     let mut together = Gram::new(&columns, sets.clone(), Arc::clone(&model), &residual, prior());
-    together.take_draws((0..DRAWS).map(draw), false, &|| true).unwrap();
+    together.take_draws(&draws, None, &|| true).unwrap();
     let (gains, best) = scores(&together);
-    let mut without = Gram::new(&columns, Vec::new(), model, &residual, prior());
-    without.take_draws((0..DRAWS).map(draw), true, &|| true).unwrap();
-    let (mut in_parts, mut best_in_parts) = (Vec::new(), vec![f64::NEG_INFINITY; DRAWS]);
-    for part in sets.chunks(7) {
-        let mut gram = without.clone();
-        gram.append(part.to_vec());
-        let (gains, best) = scores(&gram);
-        in_parts.extend(gains);
-        best_in_parts.iter_mut().zip(best).for_each(|(a, b)| *a = a.max(b));
-    }
     assert!(gains.len() > 20 && best.iter().all(|score| *score > 0.0), "{} {best:?}", gains.len());
     let near =
         |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-9 * a.abs());
-    assert!(near(&gains, &in_parts) && near(&best, &best_in_parts), "{best:?} {best_in_parts:?}");
+    for kept_entries in [usize::MAX, 0] {
+        let mut without = Gram::new(&columns, Vec::new(), Arc::clone(&model), &residual, prior());
+        without.take_draws(&draws, Some(kept_entries), &|| true).unwrap();
+        let (mut in_parts, mut best_in_parts) = (Vec::new(), vec![f64::NEG_INFINITY; DRAWS]);
+        for part in sets.chunks(7) {
+            let mut gram = without.clone();
+            gram.append(part.to_vec());
+            let (gains, best) = scores(&gram);
+            in_parts.extend(gains);
+            best_in_parts.iter_mut().zip(best).for_each(|(a, b)| *a = a.max(b));
+        }
+        assert!(near(&gains, &in_parts) && near(&best, &best_in_parts), "{best:?} {best_in_parts:?}");
+    }
 }
 
 /// A circle of 12,000 positions, read twice: its states are shared among several tasks, whose sums add up.

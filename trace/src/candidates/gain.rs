@@ -335,7 +335,7 @@ impl<'m> TrainedModel<'m> {
 
     /// Sum of squares of the residual over the training folds, and its degrees of freedom.
     pub fn residual_square(&self) -> (f64, usize) {
-        let mut residual = self.projection.residual.clone();
+        let mut residual = self.projection.residual(self.gram).into_owned();
         let mut rest = &self.coefficients[..];
         for chosen in &self.chosen {
             let (own, others) = rest.split_at(chosen.rows.ncols());

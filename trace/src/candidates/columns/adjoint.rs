@@ -118,4 +118,10 @@ impl Adjoint {
         }
         Adjoint { rows: Arc::new(rows), values }
     }
+
+    /// The same in single precision.
+    pub fn single(self) -> Adjoint<f32> {
+        let values = &self.values;
+        Adjoint { values: Mat::from_fn(values.nrows(), values.ncols(), |i, j| values[(i, j)] as f32), rows: self.rows }
+    }
 }

@@ -10,7 +10,7 @@ use abbe_model::effect::shape::Curve;
 use abbe_model::effect::{Component, Effect, Shape};
 use faer::Mat;
 
-use super::states::{Channel, DriverStates};
+use super::states::{Channel, DriverStates, Sensitivity};
 use super::{Acting, Columns, SharedSamples};
 
 /// The columns of an effect: a channel, and basis functions of the states of its driver.
@@ -76,7 +76,7 @@ impl Columns<'_> {
             for (number, test) in self.problem.tests.iter().enumerate() {
                 let scalars = acting.iter().map(|(of_part, _)| of_part[number].len()).max().unwrap_or(0);
                 let norm = |scalar| (0..parts.len()).fold(0.0, |sum: f64, k| sum.hypot(sensitivity(k, number, scalar)));
-                total.push(Arc::new((0..scalars).map(norm).collect::<Vec<f64>>()));
+                total.push(Sensitivity::within(0, (0..scalars).map(norm).collect()));
                 samples.push(match effect.acts_in(&test.name) && scalars > 0 {
                     true => Some(self.driver_samples(number, &effect.driver, axis, None)?),
                     false => None,
@@ -91,11 +91,12 @@ impl Columns<'_> {
             parts.iter().map(|part| part.columns(effect.shape.columns(&channel.states.samples))).collect();
         let mut state = 0;
         for (test, total) in channel.sensitivity.iter().enumerate() {
-            for (scalar, total) in total.iter().enumerate().filter(|_| channel.states.acts_in(test)) {
+            let scalars = if channel.states.acts_in(test) { 0..total.len() } else { 0..0 };
+            for (scalar, total) in scalars.map(|scalar| (scalar, total.at(scalar))) {
                 for (k, column) in basis.iter_mut().enumerate() {
                     let of_part = |part: usize| sensitivity(part, test, scalar) * of_parts[part][k][state];
                     let sum: f64 = (0..parts.len()).map(of_part).sum();
-                    column[state] = if *total > 0.0 { sum / total } else { 0.0 };
+                    column[state] = if total > 0.0 { sum / total } else { 0.0 };
                 }
                 state += 1;
             }
@@ -138,6 +139,7 @@ impl Columns<'_> {
             }
             let lagging = lag_s.map(|_| effect.driver.clone());
             let states = self.states(&name, &samples, part, lagging.is_some());
+            let sensitivity = sensitivity.into_iter().map(Sensitivity::whole).collect();
             Some(Arc::new(Channel { sensitivity, states, greatest_factor, lagging }))
         })
     }
@@ -243,11 +245,12 @@ impl Columns<'_> {
             let samples = self.driver_samples(test, &effect.driver, None, effect.shape.lag_s())?;
             let channels = self.problem.channels(test);
             let turned = |row: usize| if by_direction { samples[row].direction } else { 1.0 };
-            let inside = |row: usize| rows.is_none_or(|rows| rows.contains(&row));
-            let of_row = |(row, moved): (usize, usize)| if moved == channel && inside(row) { turned(row) } else { 0.0 };
-            let of_test = (0..samples.len() * channels).map(|i| of_row((i / channels, i % channels)));
-            let mut sensitivity = vec![Arc::default(); self.problem.tests.len()];
-            sensitivity[test] = Arc::new(of_test.collect());
+            let of_row = |row: usize, moved: usize| if moved == channel { turned(row) } else { 0.0 };
+            let acting = rows.cloned().unwrap_or(0..samples.len());
+            let first = acting.start * channels;
+            let of_rows = acting.flat_map(|row| (0..channels).map(move |moved| (row, moved)));
+            let mut sensitivity = vec![Sensitivity::default(); self.problem.tests.len()];
+            sensitivity[test] = Sensitivity::within(first, of_rows.map(|(row, moved)| of_row(row, moved)).collect());
             let mut of_tests = vec![None; self.problem.tests.len()];
             of_tests[test] = Some(samples);
             let lagging = effect.shape.lag_s().map(|_| effect.driver.clone());
@@ -370,6 +373,23 @@ mod tests {
         }
         drop(columns);
         assert!(problem.add_effect(&effect).is_err());
+    }
+
+    /// A term of one run is 1 in its rows and 0 in all others, in the products too.
+    #[test]
+    fn a_term_of_one_run_is_zero_outside() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
+        let (problem, _) = prepare(&session, 1).unwrap();
+        let effect = Effect::new(Component::Reading(problem.tests[1].name.clone()), Driver::None, Shape::Constant);
+        let columns = Columns::of_readings(&problem);
+        let run = problem.tests[1].readings.as_ref().unwrap().runs()[1].clone();
+        let term = columns.reading_columns(&effect, 0, false, Some(&run)).unwrap();
+        let sensitivity = &term.channel.sensitivity;
+        assert!((0..sensitivity.len()).all(|test| sensitivity[test].is_empty() == (test != 1)));
+        let rows = problem.tests[1].readings.as_ref().unwrap().rows();
+        assert!(run.start > 0 && run.end < rows, "{run:?} of {rows}");
+        assert!((0..rows + 5).all(|row| sensitivity[1].at(row) == f64::from(u8::from(run.contains(&row)))));
     }
 
     /// A bar tells errors of a tenth of a physical size at most: 0.1 mm, 1 mrad. A function that reaches 3 is scaled.

@@ -21,10 +21,12 @@ use abbe_model::sensitivity::Sensitivities;
 pub use adjoint::{Adjoint, TrainingRows, WhitenedRows};
 pub use basis::{EffectColumns, chunked};
 use faer::{Mat, MatMut};
-pub use states::{Channel, DriverStates};
+pub use states::{Channel, DriverStates, Sensitivity, SensitivityValues};
 
 /// Number of readings per evaluation of sensitivities.
 const ROWS_AT_ONCE: usize = 512;
+/// Evaluations whose results are held beside the whole.
+const PIECES_AT_ONCE: usize = 64;
 
 /// The whitened rows of a problem in fold order, and the data to compute the columns of any effect.
 pub struct Columns<'p> {
@@ -62,9 +64,13 @@ impl<'p> Columns<'p> {
     /// Computes the sensitivities at the parameter values of a fit.
     pub fn new(problem: &'p Problem, beta: &[f64]) -> Columns<'p> {
         let derivatives = sensitivities(problem, beta).into_iter();
-        let derivatives = derivatives
-            .map(|of_test| of_test.slots.into_iter().zip(of_test.derivatives.into_iter().map(Arc::new)).collect())
-            .collect();
+        let derivatives =
+            derivatives.map(|of_test| of_test.slots.into_iter().zip(shared(of_test.derivatives)).collect()).collect();
+        Columns { derivatives, ..Columns::of_readings(problem) }
+    }
+
+    /// For terms of the readings alone ([`Columns::reading_columns`]): no component acts.
+    pub fn of_readings(problem: &'p Problem) -> Columns<'p> {
         let blocks = problem.blocks();
         let mut fold_of = Vec::new();
         let kept: Vec<Vec<usize>> = blocks.iter().map(|block| problem.kept_rows(block)).collect();
@@ -84,7 +90,7 @@ impl<'p> Columns<'p> {
         }
         Columns {
             problem,
-            derivatives,
+            derivatives: vec![HashMap::new(); problem.tests.len()],
             blocks,
             kept,
             rows: target.len(),
@@ -118,14 +124,12 @@ impl<'p> Columns<'p> {
         for column_set in column_sets {
             if column_set.acts_in(block.test) {
                 let Channel { sensitivity, states, .. } = &*column_set.channel;
-                let of_block = block.rows.start * channels..block.rows.end * channels;
-                let first = of_block.start;
-                let sensitivity = &sensitivity[block.test][of_block];
+                let (sensitivity, first) = (&sensitivity[block.test], block.rows.start * channels);
                 for k in 0..column_set.count {
                     let basis = column_set.basis.col_as_slice(k);
-                    let entries = raw.col_as_slice_mut(column + k).iter_mut().zip(sensitivity).enumerate();
-                    let state = |i: usize| states.of_scalar(block.test, first + i, channels);
-                    entries.for_each(|(i, (entry, s))| *entry = s * f64::from(basis[state(i)]));
+                    let state = |scalar: usize| states.of_scalar(block.test, scalar, channels);
+                    let entries = raw.col_as_slice_mut(column + k).iter_mut().zip(first..);
+                    entries.for_each(|(entry, i)| *entry = sensitivity.at(i) * f64::from(basis[state(i)]));
                 }
             }
             column += column_set.count;
@@ -215,6 +219,21 @@ impl<'p> Columns<'p> {
     }
 }
 
+/// The columns, of which equal ones are held once: of two linear axes that follow each other, an equal error moves the
+/// readings equally. Mostly half of the columns are equal to others.
+fn shared(columns: Vec<Vec<f64>>) -> Vec<Arc<Vec<f64>>> {
+    let mut distinct: Vec<Arc<Vec<f64>>> = Vec::new();
+    let one = |column: Vec<f64>| match distinct.iter().find(|known| ***known == column) {
+        Some(known) => Arc::clone(known),
+        None => {
+            let column = Arc::new(column);
+            distinct.push(Arc::clone(&column));
+            column
+        }
+    };
+    columns.into_iter().map(one).collect()
+}
+
 /// The sensitivities of every test, computed in pieces that keep all cores busy with both short and long tests.
 fn sensitivities(problem: &Problem, beta: &[f64]) -> Vec<Sensitivities> {
     let values = problem.slot_values(beta);
@@ -229,21 +248,27 @@ fn sensitivities(problem: &Problem, beta: &[f64]) -> Vec<Sensitivities> {
                 .map(move |k| (test, k * ROWS_AT_ONCE..((k + 1) * ROWS_AT_ONCE).min(rows)))
         })
         .collect();
-    let parts = parallel::map(pieces.len(), &|k| {
-        let (test, rows) = &pieces[k];
-        let model = &problem.models[*test];
-        model.sensitivities(&values[*test], &model.effective_slots(), rows.clone())
-    });
     let mut tests: Vec<Sensitivities> = Vec::new();
-    for ((test, _), part) in pieces.iter().zip(parts) {
-        match tests.get_mut(*test) {
-            Some(whole) => {
-                whole.readings.extend(part.readings);
-                for (column, more) in whole.derivatives.iter_mut().zip(part.derivatives) {
-                    column.extend(more);
+    for pieces in pieces.chunks(PIECES_AT_ONCE) {
+        let parts = parallel::map(pieces.len(), &|k| {
+            let (test, rows) = &pieces[k];
+            let model = &problem.models[*test];
+            model.sensitivities(&values[*test], &model.effective_slots(), rows.clone())
+        });
+        for ((test, _), mut part) in pieces.iter().zip(parts) {
+            match tests.get_mut(*test) {
+                Some(whole) => {
+                    whole.readings.extend(part.readings);
+                    for (column, more) in whole.derivatives.iter_mut().zip(part.derivatives) {
+                        column.extend(more);
+                    }
+                }
+                None => {
+                    let scalars = problem.models[*test].rows() * problem.channels(*test);
+                    part.derivatives.iter_mut().for_each(|column| column.reserve_exact(scalars - column.len()));
+                    tests.push(part);
                 }
             }
-            None => tests.push(part),
         }
     }
     tests
@@ -257,6 +282,14 @@ mod tests {
     use abbe_identify::fit::prepare;
 
     use super::*;
+
+    #[test]
+    fn equal_columns_are_held_once() {
+        let found = shared(vec![vec![1.0, 2.0], vec![0.0, 0.0], vec![1.0, 2.0], vec![0.0, -0.0], vec![1.0, 2.5]]);
+        assert_eq!(found.iter().map(|column| column[1]).collect::<Vec<_>>(), [2.0, 0.0, 2.0, 0.0, 2.5]);
+        let same = |a: usize, b: usize| Arc::ptr_eq(&found[a], &found[b]);
+        assert!(same(0, 2) && same(1, 3) && !same(0, 1) && !same(0, 4));
+    }
 
     /// No file holds a test without readings, but a calling program may supply one.
     #[test]

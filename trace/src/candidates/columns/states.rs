@@ -89,12 +89,67 @@ impl DriverStates {
     }
 }
 
+/// The change of each scalar reading of a test per unit of a basis function. A term of one run is zero in all others, whose
+/// values are not held.
+#[derive(Clone, Debug, Default)]
+pub struct Sensitivity {
+    /// The scalar reading of the first value.
+    first: usize,
+    values: Arc<Vec<f64>>,
+}
+
+impl Sensitivity {
+    /// Of all scalar readings.
+    pub fn whole(values: Arc<Vec<f64>>) -> Sensitivity {
+        Sensitivity { first: 0, values }
+    }
+
+    /// Of the scalar readings from one on; zero for all others.
+    pub fn within(first: usize, values: Vec<f64>) -> Sensitivity {
+        Sensitivity { first, values: Arc::new(values) }
+    }
+
+    /// Whether no reading has a value.
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    /// Number of scalar readings up to the last value.
+    pub fn len(&self) -> usize {
+        self.first + self.values.len()
+    }
+
+    /// The values, for a loop over many readings.
+    pub fn values(&self) -> SensitivityValues<'_> {
+        SensitivityValues { first: self.first, values: &self.values }
+    }
+
+    /// The value of a scalar reading.
+    pub fn at(&self, scalar: usize) -> f64 {
+        self.values().at(scalar)
+    }
+}
+
+/// The values of a [`Sensitivity`].
+#[derive(Clone, Copy)]
+pub struct SensitivityValues<'s> {
+    first: usize,
+    values: &'s [f64],
+}
+
+impl SensitivityValues<'_> {
+    /// The value of a scalar reading.
+    #[inline(always)]
+    pub fn at(&self, scalar: usize) -> f64 {
+        self.values.get(scalar.wrapping_sub(self.first)).copied().unwrap_or_default()
+    }
+}
+
 /// What moves the readings and what it follows. Effects that differ in their shapes alone share a channel.
 #[derive(Debug)]
 pub struct Channel {
-    /// The change of each scalar reading per unit of the basis function, by test. Empty for a test in which the effect
-    /// does not act.
-    pub sensitivity: Vec<Arc<Vec<f64>>>,
+    /// By test. Empty for a test in which the effect does not act.
+    pub sensitivity: Vec<Sensitivity>,
     /// The states of the driver.
     pub states: Arc<DriverStates>,
     /// The largest absolute value of what multiplies the basis functions, other than the sensitivity of the component.

@@ -26,14 +26,26 @@ impl Columns<'_> {
         Mat::from_fn(found.len() / count.max(1), count, |i, j| found[i * count + j])
     }
 
-    /// The unwhitened rows of `[J | r]` at given parameter values, block after block.
+    /// The unwhitened rows of `J T` and `r` at given parameter values, with parameters × columns `T`, block after block.
     ///
     /// # Errors
     /// If the model cannot be evaluated.
-    pub fn unwhitened_model_rows(&self, beta: &[f64]) -> Result<Mat<f64>, IdentifyError> {
+    pub fn unwhitened_model_rows(
+        &self,
+        beta: &[f64],
+        to_parameters: &Mat<f64>,
+    ) -> Result<(Mat<f64>, Vec<f64>), IdentifyError> {
         let values = self.problem.slot_values(beta);
-        let blocks = self.blocks.iter().map(|block| self.problem.rows(&values, block));
-        Ok(self.unwhitened(blocks.collect::<Result<_, _>>()?))
+        let rows = self.blocks.iter().map(|block| self.counting(block).len()).sum();
+        let (mut model, mut residual) = (Mat::zeros(rows, to_parameters.ncols()), Vec::with_capacity(rows));
+        for block in &self.blocks {
+            let raw = self.problem.rows(&values, block)?;
+            let counting = self.counting(block);
+            let own = Mat::from_fn(counting.len(), beta.len(), |i, j| raw[(counting[i], j)]);
+            model.as_mut().subrows_mut(residual.len(), own.nrows()).copy_from(&own * to_parameters);
+            residual.extend(counting.iter().map(|i| raw[(*i, beta.len())]));
+        }
+        Ok((model, residual))
     }
 
     /// The fold of each row of [`Columns::unwhitened_model_rows`].
@@ -67,21 +79,5 @@ impl Columns<'_> {
         let channels = self.problem.channels(block.test);
         let start = block.rows.start * channels;
         (0..block.rows.len() * channels).filter(|i| self.problem.counts(block.test, start + i)).collect()
-    }
-
-    /// The accepted rows of all blocks, one block below another.
-    fn unwhitened(&self, blocks: Vec<Mat<f64>>) -> Mat<f64> {
-        let counting: Vec<Vec<usize>> = self.blocks.iter().map(|block| self.counting(block)).collect();
-        let mut rows = Mat::zeros(counting.iter().map(Vec::len).sum(), blocks.first().map_or(0, Mat::ncols));
-        let mut start = 0;
-        for (block, counting) in blocks.iter().zip(&counting) {
-            for (k, i) in counting.iter().enumerate() {
-                for j in 0..block.ncols() {
-                    rows[(start + k, j)] = block[(*i, j)];
-                }
-            }
-            start += counting.len();
-        }
-        rows
     }
 }

@@ -34,12 +34,15 @@ use super::columns::{Adjoint, Columns, EffectColumns};
 pub(super) use projection::{ChosenEffect, Projection, SegmentProducts};
 pub(super) use tuning::{ChannelProducts, TuningSide};
 
-/// Null draws whose products are formed together.
-const DRAWS_AT_ONCE: usize = 32;
+/// Least number of null draws whose products are formed together.
+const DRAWS_AT_ONCE: usize = 16;
 /// Null draws from which the model is projected out together. Each is held in double precision.
 const PROJECTED_AT_ONCE: usize = 8;
-/// Largest number of entries of the null draws whose products are formed together, if they are more than one part.
-const MAX_NULL_ENTRIES: usize = 1_000_000;
+/// Largest number of entries of the null draws whose products are formed together, if they are more than these.
+const MAX_NULL_ENTRIES: usize = 4_000_000;
+/// Number of entries of all null draws up to which they are best kept for candidates to come: 128 MB. A search that finds
+/// nothing has none.
+pub const MAX_KEPT_DRAWS: usize = 32_000_000;
 
 /// The priors as products with the model columns.
 pub struct PriorGram {
@@ -72,8 +75,10 @@ pub struct Gram<'c> {
     prior: Arc<PriorGram>,
     /// Number of null draws.
     draws: usize,
+    /// Forms the null draws again; `None` if no segment that is added later needs them.
+    source: Option<&'c (dyn DrawSource + 'c)>,
     /// The null draws, for the products of segments that are added later.
-    null: Arc<NullDraws>,
+    null: Arc<Mutex<Option<Arc<NullDraws>>>>,
     /// For each segment draws × columns.
     null_products: Store<usize, Mat<f64>>,
     /// By training folds.
@@ -83,6 +88,23 @@ pub struct Gram<'c> {
 /// Null draws with the model projected out: some draws, one part after another. They are the largest array of a trace of few
 /// driver states. Single precision halves it; scores are compared with each other, and a rounding of 10⁻⁷ decides nothing.
 type NullDraws = Vec<Adjoint<f32>>;
+
+/// What forms null draws.
+pub trait DrawSource: Sync {
+    /// All draws from the first one on, each formed when it is taken, over the whitened rows in fold order.
+    fn draws(&self) -> Box<dyn ExactSizeIterator<Item = Vec<f64>> + Send + '_>;
+}
+
+/// Draws of a test: their number, and what forms each.
+#[cfg(test)]
+pub struct Given<F>(pub usize, pub F);
+
+#[cfg(test)]
+impl<F: Fn(usize) -> Vec<f64> + Sync> DrawSource for Given<F> {
+    fn draws(&self) -> Box<dyn ExactSizeIterator<Item = Vec<f64>> + Send + '_> {
+        Box::new((0..self.0).map(&self.1))
+    }
+}
 
 /// Values that clones share.
 type Store<K, V> = Arc<Mutex<HashMap<K, Arc<V>>>>;
@@ -127,6 +149,7 @@ impl<'c> Gram<'c> {
             residual: Arc::new(residual.to_vec()),
             prior: Arc::new(prior),
             draws: 0,
+            source: None,
             null: Arc::default(),
             null_products: Arc::default(),
             projections: Arc::default(),
@@ -136,43 +159,82 @@ impl<'c> Gram<'c> {
     }
 
     /// Forms the products of the candidates with null draws, each over all rows. Draws are taken in parts and forgotten,
-    /// unless they are `kept` for candidates that are added later.
+    /// unless candidates that are added later need them: up to `kept_entries` are then kept, and more are formed again for the
+    /// first of these candidates. `None`: no candidates are added.
     ///
     /// # Errors
     /// If products are not finite, or [`IdentifyError::Interrupted`] if `should_continue` returns `false`.
     pub fn take_draws(
         &mut self,
-        mut draws: impl ExactSizeIterator<Item = Vec<f64>> + Send,
-        kept: bool,
+        source: &'c (dyn DrawSource + 'c),
+        kept_entries: Option<usize>,
         should_continue: &(dyn Fn() -> bool + Sync),
     ) -> Result<(), IdentifyError> {
         let whole = self.projection(&self.all_folds())?;
-        let (count, layout) = (draws.len(), Arc::clone(&self.segments[0].layout));
+        let (draws, layout) = (source.draws(), Arc::clone(&self.segments[0].layout));
+        self.draws = draws.len();
+        let kept = kept_entries.is_some_and(|most| self.draws * self.residual.len() <= most);
+        let mut products = Mat::zeros(self.draws, layout.total());
+        let mut null = NullDraws::new();
+        if kept || layout.total() > 0 {
+            self.in_parts(&whole, draws, |first, side| {
+                let formed = layout.products(&whole.training, &side, false, should_continue);
+                let formed = formed.ok_or(IdentifyError::Interrupted)?.side;
+                products.as_mut().subrows_mut(first, formed.nrows()).copy_from(&formed);
+                if kept {
+                    null.push(side);
+                }
+                Ok(())
+            })?;
+        }
+        self.source = kept_entries.map(|_| source);
+        self.null = Arc::new(Mutex::new(kept.then(|| Arc::new(null))));
+        stored(&self.null_products, &self.segments[0].key, || Ok(Arc::new(products))).map(|_: Arc<Mat<f64>>| ())
+    }
+
+    /// Passes null draws on in parts, with the model projected out, each with the number of its first draw. Draws are formed
+    /// one after the other: the next ones beside what is done with these.
+    fn in_parts(
+        &self,
+        whole: &Projection,
+        mut draws: Box<dyn ExactSizeIterator<Item = Vec<f64>> + Send + '_>,
+        mut each: impl FnMut(usize, Adjoint<f32>) -> Result<(), IdentifyError> + Send,
+    ) -> Result<(), IdentifyError> {
         // Whole parts: a column of fewer draws is padded to a multiple of 64 bytes.
         let at_once = DRAWS_AT_ONCE * (MAX_NULL_ENTRIES / (DRAWS_AT_ONCE * self.residual.len().max(1))).max(1);
-        let mut products = Mat::zeros(count, layout.total());
-        let mut null = NullDraws::new();
+        let mut rows = None;
         let mut next: Vec<Vec<f64>> = draws.by_ref().take(at_once).collect();
-        for first in (0..count).step_by(at_once) {
+        for first in (0..self.draws).step_by(at_once) {
             let part = std::mem::take(&mut next);
-            let formed = || {
-                let side = self.projected(&whole, part);
-                let formed = layout.products(&whole.training, &side, false, should_continue);
-                formed.map(|formed| (side, formed))
+            let done = || {
+                let side = self.projected(whole, part);
+                let rows = rows.get_or_insert_with(|| Arc::clone(&side.rows));
+                each(first, Adjoint { rows: Arc::clone(rows), ..side })
             };
-            // Draws are formed one after the other: the next ones beside the products of these.
-            let formed = parallel::both(formed, || next = draws.by_ref().take(at_once).collect()).0;
-            let (mut side, formed) = formed.ok_or(IdentifyError::Interrupted)?;
-            products.as_mut().subrows_mut(first, formed.side.nrows()).copy_from(&formed.side);
-            if kept {
-                if let Some(first) = null.first() {
-                    side.rows = Arc::clone(&first.rows);
-                }
-                null.push(side);
-            }
+            parallel::both(done, || next = draws.by_ref().take(at_once).collect()).0?;
         }
-        (self.draws, self.null) = (count, Arc::new(null));
-        stored(&self.null_products, &self.segments[0].key, || Ok(Arc::new(products))).map(|_: Arc<Mat<f64>>| ())
+        Ok(())
+    }
+
+    /// The null draws, for a segment that was added later.
+    fn null(&self) -> Result<Arc<NullDraws>, IdentifyError> {
+        let known = || self.null.lock().ok().and_then(|null| null.clone());
+        if let Some(null) = known() {
+            return Ok(null);
+        }
+        let mut null = NullDraws::new();
+        if let Some(source) = &self.source {
+            let whole = self.projection(&self.all_folds())?;
+            self.in_parts(&whole, source.draws(), |_, side| {
+                null.push(side);
+                Ok(())
+            })?;
+        }
+        let null = Arc::new(null);
+        if let Ok(mut place) = self.null.lock() {
+            *place = Some(Arc::clone(&null));
+        }
+        Ok(null)
     }
 
     /// Null draws with the model projected out.
@@ -182,17 +244,13 @@ impl<'c> Gram<'c> {
             let mut part = Mat::from_fn(self.residual.len(), parts[k].len(), |i, draw| parts[k][draw][i]);
             let along = &whole.inverse * transposed_product(self.model(), part.as_ref());
             matmul(part.as_mut(), Accum::Add, self.model(), along.as_ref(), -1.0, Par::Seq);
-            Adjoint::of(&whole.training, part.as_ref())
+            Adjoint::of(&whole.training, part.as_ref()).single()
         });
         let rows = projected.first().map(|part| Arc::clone(&part.rows)).unwrap_or_default();
         let mut values = Mat::zeros(draws.len(), rows.len());
         let mut first = 0;
         for part in projected {
-            for (to, from) in
-                values.as_mut().subrows_mut(first, part.values.nrows()).col_iter_mut().zip(part.values.col_iter())
-            {
-                to.iter_mut().zip(from.iter()).for_each(|(to, from)| *to = *from as f32);
-            }
+            values.as_mut().subrows_mut(first, part.values.nrows()).copy_from(&part.values);
             first += part.values.nrows();
         }
         Adjoint { rows, values }
@@ -310,12 +368,13 @@ impl<'c> Gram<'c> {
     /// The products of a segment with the projected null draws: draws × columns.
     pub(super) fn null_products(&self, segment: usize) -> Result<Arc<Mat<f64>>, IdentifyError> {
         stored(&self.null_products, &self.segments[segment].key, || {
-            debug_assert!(self.draws == 0 || !self.null.is_empty(), "the draws were not kept");
+            let null = self.null()?;
+            debug_assert!(self.draws == 0 || !null.is_empty(), "the draws are not for candidates that are added later");
             let whole = self.projection(&self.all_folds())?;
             let layout = &self.segments[segment].layout;
             let mut products = Mat::zeros(self.draws, layout.total());
             let mut first = 0;
-            for part in self.null.iter() {
+            for part in null.iter() {
                 let formed = layout.products(&whole.training, part, false, &|| true);
                 let formed = formed.ok_or(IdentifyError::Interrupted)?.side;
                 products.as_mut().subrows_mut(first, formed.nrows()).copy_from(&formed);

@@ -9,6 +9,7 @@
 //!
 //! `H` acts within the columns of `Q`, of which a fold has few: its readings belong to one test.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock};
 
@@ -23,6 +24,8 @@ use crate::candidates::columns::{Adjoint, EffectColumns, TrainingRows};
 
 /// Share of the largest entry below which a pivot of the model rows of a fold is a rounding error.
 const PIVOT_ROUNDING: f64 = 1e-13;
+/// Number of entries up to which what can be formed anew is kept: 64 MB.
+const MAX_KEPT_ENTRIES: usize = 8_000_000;
 /// Share of the product over all rows below which a product without some folds is a rounding error.
 const PRODUCT_ROUNDING: f64 = 1e-12;
 
@@ -38,11 +41,13 @@ pub(in crate::candidates) struct Projection {
     pub coefficients: Vec<f64>,
     /// The decrease of the sum of squares by the model, priors included.
     pub explained: f64,
-    /// The residual of the model over all rows in fold order; zero outside the training folds.
-    pub residual: Mat<f64>,
+    /// The residual of the model over all rows in fold order; zero outside the training folds. In a long session it is formed
+    /// anew, since there is a projection for each fold.
+    residual: OnceLock<Mat<f64>>,
     /// The rows that were left out; `None` if there are none.
     left_out: Option<LeftOut>,
-    /// `Wᵀ [X | y⊥]` over all rows. Without some folds it is formed anew, since a projection for each fold would hold one.
+    /// `Wᵀ [X | y⊥]` over all rows. Without some folds it is formed anew, since a projection for each fold would hold one, and
+    /// in a long session, of which it is one of the largest arrays.
     side: OnceLock<Arc<Adjoint>>,
     segments: Mutex<HashMap<usize, Arc<SegmentProducts>>>,
     /// By [`key`]: the effect keeps what the addresses refer to.
@@ -133,8 +138,6 @@ impl Projection {
         }
         let inverse = pseudo_inverse(normal.as_ref())?;
         let coefficients = &inverse * &with_y;
-        let y = MatRef::from_column_major_slice(&gram.residual, gram.residual.len(), 1);
-        let residual = restricted((y - gram.model() * &coefficients).as_ref(), &training);
         let left_out: Vec<usize> = all.iter().copied().filter(|fold| !folds.contains(fold)).collect();
         let left_out = match left_out.is_empty() {
             true => None,
@@ -146,12 +149,34 @@ impl Projection {
             explained: (with_y.transpose() * &coefficients)[(0, 0)],
             coefficients: coefficients.col(0).iter().copied().collect(),
             inverse,
-            residual,
+            residual: OnceLock::new(),
             left_out,
             side: OnceLock::new(),
             segments: Mutex::default(),
             chosen: Mutex::default(),
         })
+    }
+
+    /// The residual of the model over all rows in fold order; zero outside the training folds.
+    pub fn residual(&self, gram: &Gram<'_>) -> Cow<'_, Mat<f64>> {
+        let of_all_projections = gram.residual.len() * (1 + gram.columns.fold_rows.len());
+        match of_all_projections > MAX_KEPT_ENTRIES {
+            true => Cow::Owned(self.formed_residual(gram)),
+            false => Cow::Borrowed(self.residual.get_or_init(|| self.formed_residual(gram))),
+        }
+    }
+
+    fn formed_residual(&self, gram: &Gram<'_>) -> Mat<f64> {
+        let mut residual = Mat::zeros(gram.residual.len(), 1);
+        for fold in &self.folds {
+            let rows = gram.columns.fold_rows[*fold].clone();
+            let model = gram.model().subrows(rows.start, rows.len());
+            let mut of_fold = residual.as_mut().subrows_mut(rows.start, rows.len());
+            of_fold.copy_from(MatRef::from_column_major_slice(&gram.residual[rows.clone()], rows.len(), 1));
+            let coefficients = MatRef::from_column_major_slice(&self.coefficients, self.coefficients.len(), 1);
+            matmul(of_fold, Accum::Add, model, coefficients, -1.0, Par::Seq);
+        }
+        residual
     }
 
     /// The products of a segment.
@@ -184,7 +209,7 @@ impl Projection {
         known: &SegmentProducts,
         should_continue: &(dyn Fn() -> bool + Sync),
     ) -> Result<(), IdentifyError> {
-        let side = Adjoint::of(&self.training, self.residual.as_ref());
+        let side = Adjoint::of(&self.training, Mat::as_ref(&self.residual(gram)));
         let formed = gram.segments[segment].layout.products(&self.training, &side, false, should_continue);
         let g = formed.ok_or(IdentifyError::Interrupted)?.side.row(0).iter().copied().collect();
         let products =
@@ -198,10 +223,11 @@ impl Projection {
             let rank = gram.rank();
             let mut side = Mat::zeros(gram.residual.len(), rank + 1);
             side.as_mut().subcols_mut(0, rank).copy_from(gram.model());
-            side.as_mut().subcols_mut(rank, 1).copy_from(&self.residual);
+            side.as_mut().subcols_mut(rank, 1).copy_from(&*self.residual(gram));
             Arc::new(Adjoint::of(&self.training, side.as_ref()))
         };
-        if self.left_out.is_some() { formed() } else { Arc::clone(self.side.get_or_init(formed)) }
+        let is_large = gram.residual.len() * (gram.rank() + 1) > MAX_KEPT_ENTRIES;
+        if self.left_out.is_some() || is_large { formed() } else { Arc::clone(self.side.get_or_init(formed)) }
     }
 
     fn of_all(
@@ -245,7 +271,7 @@ impl Projection {
             let mut rows = restricted(all.as_ref(), &self.training);
             let of_model = &self.inverse * transposed_product(gram.model(), rows.as_ref());
             let with_residual =
-                transposed_product(rows.as_ref(), self.residual.as_ref()).col(0).iter().copied().collect();
+                transposed_product(rows.as_ref(), Mat::as_ref(&self.residual(gram))).col(0).iter().copied().collect();
             for fold in &self.folds {
                 let of_fold = &gram.columns.fold_rows[*fold];
                 let model = gram.model().subrows(of_fold.start, of_fold.len());
@@ -296,7 +322,8 @@ impl LeftOut {
         let (q, r) = reduced(&model);
         let projected = Mat::from_fn(r.nrows(), r.nrows(), |i, j| if i == j { 1.0 } else { 0.0 })
             - &r * &whole.inverse * r.transpose();
-        let residual = Mat::from_fn(rows.len(), 1, |i, _| whole.residual[(rows[i], 0)]);
+        let of_all = whole.residual(gram);
+        let residual = Mat::from_fn(rows.len(), 1, |i, _| of_all[(rows[i], 0)]);
         let along = q.transpose() * &residual;
         let mut side = Mat::zeros(columns.rows(), q.ncols() + 1);
         for (i, row) in rows.iter().enumerate() {

@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
+use pulp::NullaryFnOnce;
 
-use crate::candidates::columns::{Adjoint, Channel, DriverStates, TrainingRows};
+use crate::candidates::columns::{Adjoint, Channel, DriverStates, SensitivityValues, TrainingRows};
 
 /// Largest distance of two states whose readings one whitened row combines. Beyond it the rows are multiplied.
 const MAX_BAND: usize = 32;
@@ -97,24 +98,64 @@ impl LocalStates {
         states: Range<usize>,
         channels: &[Arc<Channel>],
         side: &Adjoint<T>,
-        mut sums: MatMut<'_, f64>,
+        sums: MatMut<'_, f64>,
     ) {
+        pulp::Arch::new().dispatch(Gathering { local: self, states, channels, side, sums });
+    }
+}
+
+/// Sums over the readings of each state, compiled for each vector instruction set that the processor may have.
+struct Gathering<'g, T> {
+    local: &'g LocalStates,
+    states: Range<usize>,
+    channels: &'g [Arc<Channel>],
+    side: &'g Adjoint<T>,
+    sums: MatMut<'g, f64>,
+}
+
+impl<T: Copy + Into<f64>> NullaryFnOnce for Gathering<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Gathering { local, states, channels, side, mut sums } = self;
         let vectors = side.values.nrows();
+        let tests = channels.first().map_or(0, |channel| channel.sensitivity.len());
+        let sensitivities: Vec<Vec<SensitivityValues<'_>>> = (0..tests)
+            .map(|test| channels.iter().map(|channel| channel.sensitivity[test].values()).collect())
+            .collect();
         sums.fill(0.0);
         for (state, to) in states.zip(sums.col_iter_mut()) {
             let Some(to) = to.try_as_col_major_mut() else { continue };
             let to = to.as_slice_mut();
-            let start = if state == 0 { 0 } else { self.ends[state - 1] };
-            for row in &self.by_state[start..self.ends[state]] {
+            let start = if state == 0 { 0 } else { local.ends[state - 1] };
+            for row in &local.by_state[start..local.ends[state]] {
                 let (test, scalar) = side.rows[*row as usize];
                 let values = side.values.col_as_slice(*row as usize);
-                for (channel, to) in channels.iter().zip(to.chunks_exact_mut(vectors.max(1))) {
-                    let sensitivity = channel.sensitivity[test as usize][scalar as usize];
-                    to.iter_mut().zip(values).for_each(|(sum, value)| *sum += sensitivity * (*value).into());
+                let of_channels = sensitivities[test as usize].iter();
+                for (sensitivity, to) in of_channels.zip(to.chunks_exact_mut(vectors.max(1))) {
+                    let factor = sensitivity.at(scalar as usize);
+                    // Most readings are outside the run of a term of one run.
+                    if factor != 0.0 {
+                        add_multiple(to, factor, values);
+                    }
                 }
             }
         }
     }
+}
+
+/// Adds a multiple of some values. Whole pieces are vectors of the processor.
+#[inline(always)]
+fn add_multiple<T: Copy + Into<f64>>(to: &mut [f64], factor: f64, values: &[T]) {
+    let (to, to_rest) = to.as_chunks_mut::<LANES>();
+    let (values, rest) = values.as_chunks::<LANES>();
+    for (to, values) in to.iter_mut().zip(values) {
+        for k in 0..LANES {
+            to[k] += factor * values[k].into();
+        }
+    }
+    to_rest.iter_mut().zip(rest).for_each(|(sum, value)| *sum += factor * (*value).into());
 }
 
 /// The products of a channel's columns with themselves over some rows: `CᵀC = Bᵀ H B`, where `H` has a band. If
@@ -143,7 +184,7 @@ impl<'r> OwnProducts<'r> {
                         let scalar = block.start + raw;
                         (
                             local.place_of(&channel.states, block.test, scalar, training.channels[block.test]),
-                            factor * sensitivity[scalar],
+                            factor * sensitivity.at(scalar),
                         )
                     }));
                     for (k, (p, a)) in terms.iter().enumerate() {
@@ -236,7 +277,7 @@ impl<'r> OwnProducts<'r> {
                         let term = |(raw, factor): (usize, f64)| {
                             let scalar = block.start + raw;
                             let value: f64 = basis[states.of_scalar(block.test, scalar, channels)].into();
-                            factor * sensitivity[scalar] * value
+                            factor * sensitivity.at(scalar) * value
                         };
                         *value = training.filter.terms(i).map(term).sum();
                     }
