@@ -32,25 +32,28 @@ function quiet(program, args) {
   }
 }
 
-/** How cargo builds for the browser here: with the standard library of rustup, or with that of Debian from source. */
+/**
+ * How cargo builds for the browser here: with the standard library of Debian from source, or with that of rustup. Built for
+ * size, the library sorts with less code: 0.36 MB of the module.
+ */
 function toolchain() {
-  const sysroot = quiet("rustc", ["--print", "sysroot"]).trim();
   const flags = { CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS: SIMD };
-  if (sysroot && existsSync(join(sysroot, "lib/rustlib", triple, "lib"))) {
-    return { cargo: "cargo", args: [], env: flags };
-  }
   // The source of the standard library is that of the package rust-web-src.
   const linker = readdirSync("/usr/bin").find((name) => /^wasm-ld(-\d+)?$/.test(name));
-  if (linker && existsSync("/usr/bin/rustc") && existsSync("/usr/bin/cargo")) {
+  const source = "/usr/lib/rustlib/src/rust/library";
+  if (linker && ["/usr/bin/rustc", "/usr/bin/cargo", source].every((file) => existsSync(file))) {
     return {
       cargo: "/usr/bin/cargo",
-      // Built for size, it sorts with less code: half a megabyte of the module.
       args: [
         ...["-Z", "build-std=std,panic_abort", "-Z", "build-std-features=optimize_for_size"],
         ...["--config", `target.${triple}.linker="/usr/bin/${linker}"`],
       ],
       env: { ...flags, RUSTC: "/usr/bin/rustc", RUSTC_BOOTSTRAP: "1" },
     };
+  }
+  const sysroot = quiet("rustc", ["--print", "sysroot"]).trim();
+  if (sysroot && existsSync(join(sysroot, "lib/rustlib", triple, "lib"))) {
+    return { cargo: "cargo", args: [], env: flags };
   }
   return undefined;
 }
