@@ -252,7 +252,7 @@ fn structure_by_batches(
     let in_batches = !batch.rest.is_empty();
     let sets = if in_batches { Vec::new() } else { std::mem::take(&mut batch.sets) };
     let mut first = Gram::new(columns, sets, start.model.clone(), &start.residual, start.prior());
-    first.take_draws(null, in_batches.then_some(0), should_continue)?;
+    first.take_draws(null, in_batches.then_some(usize::MAX), should_continue)?;
     let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
     let mut best: Option<(&Detector, f64, f64)> = None;
     let mut null_best = vec![f64::NEG_INFINITY; first.draws()];

@@ -40,8 +40,8 @@ const DRAWS_AT_ONCE: usize = 16;
 const PROJECTED_AT_ONCE: usize = 8;
 /// Largest number of entries of the null draws whose products are formed together, if they are more than these.
 const MAX_NULL_ENTRIES: usize = 4_000_000;
-/// Number of entries of all null draws up to which they are best kept for candidates to come: 128 MB. A search that finds
-/// nothing has none.
+/// Number of entries of all null draws up to which a search best keeps them for candidates to come: 128 MB. A search that
+/// finds nothing adds no candidates.
 pub const MAX_KEPT_DRAWS: usize = 32_000_000;
 
 /// The priors as products with the model columns.
@@ -178,6 +178,9 @@ impl<'c> Gram<'c> {
         let mut null = NullDraws::new();
         if kept || layout.total() > 0 {
             self.in_parts(&whole, draws, |first, side| {
+                if !should_continue() {
+                    return Err(IdentifyError::Interrupted);
+                }
                 let formed = layout.products(&whole.training, &side, false, should_continue);
                 let formed = formed.ok_or(IdentifyError::Interrupted)?.side;
                 products.as_mut().subrows_mut(first, formed.nrows()).copy_from(&formed);
