@@ -35,6 +35,27 @@ for (const folder of SESSIONS) {
   }
 }
 
+test("a long session says that the page has one processor", async () => {
+  const { page, wrong } = await opened(own.chromium, own.server.address);
+  const files = filesOf(hermle);
+  await give(page, files);
+  await page.getByText(/\d+ readings/).first().waitFor();
+  const says = page.getByText("the page computes on one processor");
+  assert.equal(await says.count(), 0);
+  // More runs of the same.
+  const name = Object.keys(files).find((name) => name.endsWith(".csv"));
+  const [header, ...rows] = files[name].toString().trim().split("\n");
+  assert.match(header, /^time_s,run,/);
+  const later = (row, times) =>
+    row.replace(/^([\d.]+),(\d+)/, (_, time, run) => `${Number(time) + 1e4 * times},${Number(run) + 100 * times}`);
+  const copies = Array.from({ length: Math.ceil(50_000 / rows.length) }, (_, times) => times);
+  const repeated = copies.flatMap((times) => rows.map((row) => later(row, times)));
+  await give(page, { ...files, [name]: [header, ...repeated].join("\n") });
+  await says.waitFor();
+  assert.deepEqual(wrong, []);
+  await page.close();
+});
+
 test("the single file does the same from the disk, and the report is that of the command", async () => {
   const { page, wrong } = await opened(own.chromium, single);
   await give(page, {
