@@ -219,8 +219,8 @@ impl<'p> Columns<'p> {
     }
 }
 
-/// The columns, of which equal ones are held once: of two linear axes that follow each other, an equal error moves the
-/// readings equally. Mostly half of the columns are equal to others.
+/// The columns, with equal ones held once. Equal errors of two linear axes that follow each other change the readings equally,
+/// so that about half of the columns of a machine equal others.
 fn shared(columns: Vec<Vec<f64>>) -> Vec<Arc<Vec<f64>>> {
     let mut distinct: Vec<Arc<Vec<f64>>> = Vec::new();
     let one = |column: Vec<f64>| match distinct.iter().find(|known| ***known == column) {

@@ -38,7 +38,7 @@ pub(super) use tuning::{ChannelProducts, TuningSide};
 const DRAWS_AT_ONCE: usize = 16;
 /// Null draws from which the model is projected out together. Each is held in double precision.
 const PROJECTED_AT_ONCE: usize = 8;
-/// Largest number of entries of the null draws whose products are formed together, if they are more than these.
+/// Largest number of entries of the null draws whose products are formed together. The least number of draws may have more.
 const MAX_NULL_ENTRIES: usize = 4_000_000;
 /// Number of entries of all null draws up to which a search best keeps them for candidates to come: 128 MB. A search that
 /// finds nothing adds no candidates.
