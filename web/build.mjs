@@ -17,7 +17,13 @@ const target = resolve(process.env.CARGO_TARGET_DIR ?? join(root, "target"));
 const triple = "wasm32-unknown-unknown";
 const quick = process.argv.includes("--quick");
 const QUICK = ["lto=false", "codegen-units=16"].flatMap((one) => ["--config", `profile.web.${one}`]);
-const SIMD = "-C target-feature=+simd128";
+// Vector instructions, and a memory that workers share: the module imports it, at most 4 GiB.
+const FLAGS = [
+  "-C target-feature=+simd128,+atomics,+bulk-memory,+mutable-globals",
+  ...["shared-memory", "import-memory", `max-memory=${2 ** 32}`].map((option) => `-C link-arg=--${option}`),
+  ...["__wasm_init_tls", "__tls_size", "__tls_align", "__tls_base"].map((name) => `-C link-arg=--export=${name}`),
+].join(" ");
+const LIBRARY = ["-Z", "build-std=std,panic_abort", "-Z", "build-std-features=optimize_for_size"];
 
 function run(program, args, options = {}) {
   console.error(`== ${program} ${args.join(" ")}`);
@@ -33,27 +39,17 @@ function quiet(program, args) {
 }
 
 /**
- * How cargo builds for the browser here: with the standard library of Debian from source, or with that of rustup. Built for
- * size, the library sorts with less code: 0.36 MB of the module.
+ * The compilers with the source of the standard library: of rustup (component rust-src) or of Debian (rust-web-src). The
+ * compiled library of rustup has no threads, and is built for speed: 0.36 MB of the module.
  */
 function toolchain() {
-  const flags = { CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS: SIMD };
-  // The source of the standard library is that of the package rust-web-src.
-  const linker = readdirSync("/usr/bin").find((name) => /^wasm-ld(-\d+)?$/.test(name));
-  const source = "/usr/lib/rustlib/src/rust/library";
-  if (linker && ["/usr/bin/rustc", "/usr/bin/cargo", source].every((file) => existsSync(file))) {
-    return {
-      cargo: "/usr/bin/cargo",
-      args: [
-        ...["-Z", "build-std=std,panic_abort", "-Z", "build-std-features=optimize_for_size"],
-        ...["--config", `target.${triple}.linker="/usr/bin/${linker}"`],
-      ],
-      env: { ...flags, RUSTC: "/usr/bin/rustc", RUSTC_BOOTSTRAP: "1" },
-    };
-  }
-  const sysroot = quiet("rustc", ["--print", "sysroot"]).trim();
-  if (sysroot && existsSync(join(sysroot, "lib/rustlib", triple, "lib"))) {
-    return { cargo: "cargo", args: [], env: flags };
+  for (const rustc of ["rustc", "/usr/bin/rustc"]) {
+    const sysroot = quiet(rustc, ["--print", "sysroot"]).trim();
+    if (!sysroot || !existsSync(join(sysroot, "lib/rustlib/src/rust/library"))) continue;
+    // That of rustup brings its linker.
+    const linker = sysroot === "/usr" && readdirSync("/usr/bin").find((name) => /^wasm-ld(-\d+)?$/.test(name));
+    const cargo = rustc.replace("rustc", "cargo");
+    return { rustc, cargo, linker: linker ? ["--config", `target.${triple}.linker="/usr/bin/${linker}"`] : [] };
   }
   return undefined;
 }
@@ -62,13 +58,21 @@ function buildModule() {
   const tools = toolchain();
   if (!tools) {
     console.error(
-      `no standard library for ${triple}: rustup target add ${triple}, or apt-get install rustc-web cargo-web rust-web-src lld`,
+      "no source of the standard library: rustup component add rust-src, or apt-get install rustc-web cargo-web rust-web-src lld",
     );
     process.exit(3);
   }
-  const env = { ...process.env, ...tools.env, CARGO_TARGET_DIR: target };
-  const args = ["--profile", "web", "--target", triple, "-p", "abbe-web", ...(quick ? QUICK : []), ...tools.args];
-  run(tools.cargo, ["build", "--locked", ...args], { env });
+  const args = ["--profile", "web", "--target", triple, "-p", "abbe-web", ...(quick ? QUICK : []), ...LIBRARY];
+  run(tools.cargo, ["build", "--locked", ...args, ...tools.linker], {
+    env: {
+      ...process.env,
+      CARGO_TARGET_DIR: target,
+      CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS: FLAGS,
+      RUSTC: tools.rustc,
+      // Only a bootstrap builds the library from its source.
+      RUSTC_BOOTSTRAP: "1",
+    },
+  });
   const bindgen = join(target, "bindgen");
   run(
     "cargo",
@@ -89,6 +93,7 @@ function buildModule() {
   if (quick) return;
   const features = [
     "simd",
+    "threads",
     "bulk-memory",
     "nontrapping-float-to-int",
     "sign-ext",
@@ -188,9 +193,18 @@ addEventListener("activate", (event) => {
   const removed = caches.keys().then((names) => Promise.all(names.filter(isOld).map((name) => caches.delete(name))));
   event.waitUntil(removed.then(() => clients.claim()));
 });
+// With these headers the browser isolates the page, and workers may share a memory.
+function isolated(answer) {
+  if (answer.status === 0) return answer;
+  const headers = new Headers(answer.headers);
+  headers.set("Cross-Origin-Opener-Policy", "same-origin");
+  headers.set("Cross-Origin-Embedder-Policy", "require-corp");
+  return new Response(answer.body, { status: answer.status, statusText: answer.statusText, headers });
+}
 addEventListener("fetch", (event) => {
   if (event.request.method !== "GET") return;
-  event.respondWith(caches.match(event.request, { ignoreSearch: true }).then((kept) => kept ?? fetch(event.request)));
+  const kept = caches.match(event.request, { ignoreSearch: true });
+  event.respondWith(kept.then((kept) => kept ?? fetch(event.request)).then(isolated));
 });
 `;
 }

@@ -42,6 +42,8 @@ function compiledModule(): Promise<WebAssembly.Module> {
 
 export class Engine {
   private worker?: Worker;
+  /** Hears of faults in the other workers of the module. */
+  private faults?: BroadcastChannel;
   private waiting: Waiting[] = [];
   /** How often it was stopped: a call that waits for its worker meanwhile is stopped too. */
   private stops = 0;
@@ -62,6 +64,7 @@ export class Engine {
     this.stops += 1;
     this.worker?.terminate();
     this.worker = undefined;
+    this.faults?.close();
     const waiting = this.waiting.splice(0);
     for (const one of waiting) one.reject(new EngineError({ message: why }));
   }
@@ -71,7 +74,10 @@ export class Engine {
     const module = await compiledModule();
     if (this.worker) return this.worker;
     const worker = startWorker();
-    worker.postMessage({ module });
+    const faults = `abbe-${Math.random()}`;
+    this.faults = new BroadcastChannel(faults);
+    this.faults.onmessage = ({ data }: MessageEvent<Fault>) => this.broken(data);
+    worker.postMessage({ module, faults });
     worker.onmessage = ({ data }: MessageEvent<Answer>) => {
       if (worker === this.worker) this.answered(data);
     };
@@ -95,7 +101,12 @@ export class Engine {
       return;
     }
     one.reject(new EngineError(answer.fault));
-    // After a fault of the module itself its memory is not trusted.
-    if (answer.fault.message.startsWith(BROKEN)) this.stop(answer.fault.message);
+    if (answer.fault.message.startsWith(BROKEN)) this.broken(answer.fault);
+  }
+
+  /** After a fault of the module itself its memory is not trusted. */
+  private broken(fault: Fault): void {
+    this.waiting.shift()?.reject(new EngineError(fault));
+    this.stop(fault.message);
   }
 }

@@ -12,6 +12,7 @@ export interface Result {
   session?: string;
   seconds: number;
   bytes: number;
+  processors: number;
 }
 
 interface Props {
@@ -21,10 +22,10 @@ interface Props {
 }
 
 export function ResultView({ result, stem }: Props) {
-  const { kind, seconds, bytes, session } = result;
+  const { kind, seconds, bytes, processors, session } = result;
   return (
     <>
-      <p class="actions" data-kind={kind} data-seconds={seconds} data-bytes={bytes}>
+      <p class="actions" data-kind={kind} data-seconds={seconds} data-bytes={bytes} data-processors={processors}>
         <button onClick={() => download(`${stem}-${kind}.json`, result.json, "application/json")}>JSON</button>
         <button onClick={() => download(`${stem}-${kind}.csv`, result.csv)}>CSV</button>
         <button onClick={() => download(`${stem}-residuals.csv`, result.residuals)}>Residuals</button>
@@ -34,7 +35,8 @@ export function ResultView({ result, stem }: Props) {
           <button onClick={() => download(`${stem}-next.toml`, session)}>Continued session</button>
         )}
         <span>
-          {kind} in {seconds.toFixed(1)} s, {(bytes / 2 ** 20).toFixed(0)} MiB
+          {kind} in {seconds.toFixed(1)} s, {processors === 1 ? "one processor" : `${processors} processors`},{" "}
+          {(bytes / 2 ** 20).toFixed(0)} MiB
         </span>
       </p>
       <iframe title="Report" sandbox="allow-scripts allow-downloads" srcdoc={result.report} />

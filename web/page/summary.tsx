@@ -11,6 +11,12 @@ export interface Checked {
 /** From here on the time of a trace on one processor matters. */
 const MANY_READINGS = 50_000;
 
+/** What a page that is not isolated can do: the service worker of the first visit isolates the next. */
+const next = () =>
+  "serviceWorker" in navigator && navigator.serviceWorker.controller
+    ? "reload it, which keeps your work, for all processors"
+    : "the command on all";
+
 export function Summary({ checked }: { checked: Checked }) {
   const readings = checked.tests.reduce((sum, test) => sum + test.readings, 0);
   return (
@@ -20,8 +26,8 @@ export function Summary({ checked }: { checked: Checked }) {
         {readings ? `${readings} readings` : "a plan without readings"}
         {checked.effects.length > 0 && `; declared effects: ${checked.effects.join(", ")}`}
       </p>
-      {readings > MANY_READINGS && (
-        <p class="note">A trace of so many readings takes minutes: the page computes on one processor, the command on all.</p>
+      {readings > MANY_READINGS && !crossOriginIsolated && (
+        <p class="note">A trace of so many readings takes a minute or more: the page computes on one processor; {next()}.</p>
       )}
       {checked.warnings.length > 0 && (
         <ul class="warning">

@@ -1,12 +1,23 @@
 // The worker: holds a folder and a plan, and calls the module.
 
-import init, { type InitOutput, Fit, Folder, Import, Plan, Trace, filesOfCode, instruments } from "../pkg/abbe.js";
+import init, { Fit, Folder, Import, Plan, Trace, filesOfCode, instruments, makePool, workInPool } from "../pkg/abbe.js";
 import { BROKEN, type Fault } from "./protocol";
+
+/** What a worker needs: the module, and the channel to the page for faults of its other workers. */
+interface Start {
+  module: WebAssembly.Module;
+  faults: string;
+}
+interface Join extends Start {
+  memory: WebAssembly.Memory;
+}
 
 export type Files = [path: string, contents: Uint8Array][];
 
-let ready: Promise<InitOutput> | undefined;
+let ready: Promise<WebAssembly.Memory> | undefined;
 let memory: WebAssembly.Memory | undefined;
+/** Threads of the module. */
+let processors = 1;
 let folder: Folder | undefined;
 let plan: Plan | undefined;
 
@@ -15,8 +26,60 @@ function held<T>(value: T | undefined): T {
   return value;
 }
 
-/** The memory of the module, which never shrinks, bytes. */
-const used = () => ({ bytes: memory?.buffer.byteLength ?? 0 });
+/** What the memory of the module holds at first, pages of 64 KiB: at least what the module asks for. */
+const INITIAL = 64;
+/** What it may reach, pages: a browser of 32 bits refuses the first. */
+const LARGEST = [65536, 32768, 16384, 8192];
+/** Most threads: each has a stack and its share of a computation in memory. */
+const MOST_THREADS = 16;
+
+/** The memory of the module. Only an isolated page may give it to other workers. */
+function newMemory(): WebAssembly.Memory {
+  let refused: unknown;
+  for (const maximum of LARGEST) {
+    try {
+      return new WebAssembly.Memory({ initial: INITIAL, maximum, shared: true });
+    } catch (error) {
+      refused = error;
+    }
+  }
+  throw refused;
+}
+
+/** Starts the module with a thread for each processor; with one if the page is not isolated. */
+async function start({ module, faults }: Start): Promise<WebAssembly.Memory> {
+  const memory = newMemory();
+  await init({ module_or_path: module, memory });
+  const others = crossOriginIsolated ? Math.min(navigator.hardwareConcurrency, MOST_THREADS) - 1 : 0;
+  const joined = await Promise.all(Array.from({ length: others }, () => isJoined({ module, memory, faults })));
+  processors += joined.filter(Boolean).length;
+  makePool(processors);
+  return memory;
+}
+
+/** Starts a worker of the pool; false if the browser gives none. */
+function isJoined(join: Join): Promise<boolean> {
+  return new Promise((resolve) => {
+    const worker = new Worker(location.href, { type: "module" });
+    worker.onmessage = () => resolve(true);
+    worker.onerror = () => resolve(false);
+    worker.postMessage({ join });
+  });
+}
+
+/** Works as a thread of the pool until it is ended. The worker that computes waits for it and hears of no fault. */
+async function join({ module, memory, faults }: Join): Promise<void> {
+  await init({ module_or_path: module, memory });
+  postMessage("joined");
+  try {
+    workInPool();
+  } catch (error) {
+    new BroadcastChannel(faults).postMessage(faultOf(error));
+  }
+}
+
+/** What a result took: the memory of the module, which never shrinks, bytes, and its threads. */
+const used = () => ({ bytes: memory?.buffer.byteLength ?? 0, processors });
 
 /** Replaces the folder. */
 function open(files: Files): void {
@@ -90,12 +153,13 @@ function faultOf(error: unknown): Fault {
 }
 
 onmessage = async ({ data }: MessageEvent) => {
+  if (data.join) return join(data.join);
   if (data.module) {
-    ready = init({ module_or_path: data.module });
+    ready = start(data);
     return;
   }
   try {
-    memory = (await ready)?.memory;
+    memory = await ready;
     if (data.files) open(data.files as Files);
     const answer = await methods[data.method](...(data.args as never[]));
     const transfer = answer instanceof Float64Array ? [answer.buffer] : [];

@@ -3,6 +3,7 @@
 //!
 //! - [`folder`]: files, and the sessions in them; [`mod@import`]: foreign files as a session; [`fit`], [`trace`]: results;
 //! - [`plan`]: a plan that changes while it is looked at;
+//! - [`pool`]: the threads of the module;
 //! - [`failed`]: errors with file, line and column.
 
 #![cfg_attr(
@@ -16,4 +17,5 @@ mod folder;
 mod import;
 mod output;
 mod plan;
+mod pool;
 mod trace;

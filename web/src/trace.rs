@@ -87,8 +87,11 @@ extern "C" {
     fn say(words: &str);
 }
 
-/// Tells what is done now. The work goes on until the page ends the worker.
+/// Tells what is done now; only the first thread, since the other workers have no `abbeProgress`. The work goes on until
+/// the page ends the worker.
 fn tell(progress: &Progress) -> bool {
-    progress.words().iter().for_each(|words| say(words));
+    if rayon::current_thread_index() == Some(0) {
+        progress.words().iter().for_each(|words| say(words));
+    }
     true
 }

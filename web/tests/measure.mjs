@@ -6,10 +6,12 @@ import { copyFileSync, mkdtempSync, readFileSync, rmSync, statSync, writeFileSyn
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { brotliCompressSync, gzipSync } from "node:zlib";
-import { abbe, browser, filesOf, give, hermle, opened, root, served, single, web } from "./page.mjs";
+import { abbe, browser, filesOf, give, hermle, ISOLATING, opened, root, served, single, web } from "./page.mjs";
 
 const chromium = await browser();
 const server = await served();
+// Where the page is isolated it computes on all processors.
+const isolating = await served(ISOLATING);
 const median = (times) => times.toSorted((a, b) => a - b)[Math.floor(times.length / 2)];
 const seconds = (milliseconds) => `${(milliseconds / 1000).toFixed(2)} s`;
 
@@ -30,7 +32,7 @@ function native(folder) {
   return performance.now() - start;
 }
 
-/** The trace of the open session in the page: its time, ms, and the memory of the module, bytes. */
+/** The trace of the open session in the page: its time, ms, its processors, and the memory of the module, bytes. */
 async function traced(page) {
   // The result of before stays until the next: it has another time.
   const shown = page.locator("[data-seconds]");
@@ -40,8 +42,8 @@ async function traced(page) {
     (before) => (document.querySelector("[data-seconds]")?.dataset.seconds ?? before) !== before,
     before,
   );
-  const { seconds, bytes } = await shown.evaluate(({ dataset }) => ({ ...dataset }));
-  return { time: 1000 * Number(seconds), bytes: Number(bytes) };
+  const { seconds, bytes, processors } = await shown.evaluate(({ dataset }) => ({ ...dataset }));
+  return { time: 1000 * Number(seconds), bytes: Number(bytes), processors };
 }
 
 /** A session of 100,016 readings with an effect: four tests of fine steps, simulated by the command. */
@@ -87,24 +89,28 @@ async function measureStart() {
   }
 }
 
-async function measureTrace() {
-  const { page } = await opened(chromium, server.address);
+async function measureTrace({ address }) {
+  const { page } = await opened(chromium, address);
   await give(page, filesOf(hermle));
   await page.getByText("2416 readings").waitFor();
   const [theirs, ours] = [[], []];
+  let on = "";
   for (let k = 0; k < 6; k++) {
     theirs.push(native(hermle));
-    ours.push((await traced(page)).time);
+    const { time, processors } = await traced(page);
+    ours.push(time);
+    on = processors;
   }
   const [first, ...later] = ours;
   console.log(`trace of 2,416 readings, the command on one thread: ${seconds(median(theirs))}`);
-  console.log(`in the page: first ${timed(first, median(theirs))}; later ${timed(median(later), median(theirs))}`);
+  const words = `first ${timed(first, median(theirs))}; later ${timed(median(later), median(theirs))}`;
+  console.log(`in the page, processors ${on}: ${words}`);
   await page.close();
 }
 
-async function measureLargeTrace() {
+async function measureLargeTrace({ address }) {
   const { folder, remove } = largeSession();
-  const { page } = await opened(chromium, server.address);
+  const { page } = await opened(chromium, address);
   await give(page, filesOf(folder));
   await page.getByText("100016 readings").waitFor();
   // What the page tells meanwhile.
@@ -119,11 +125,11 @@ async function measureLargeTrace() {
   });
   // The command before and after the page: other work on the machine would favour one of them.
   const before = native(folder);
-  const { time, bytes } = await traced(page);
+  const { time, bytes, processors } = await traced(page);
   const theirs = (before + native(folder)) / 2;
   const told = await page.evaluate(() => [...globalThis.told].filter((words) => words !== ""));
   console.log(`trace of 100,016 readings, the command on one thread: ${seconds(theirs)}`);
-  console.log(`in the page: ${timed(time, theirs)}; memory of the module ${megabytes(bytes)}`);
+  console.log(`in the page, processors ${processors}: ${timed(time, theirs)}; memory of the module ${megabytes(bytes)}`);
   console.log(`told meanwhile: ${told.length} messages, such as ${told.slice(0, 3).join("; ")}`);
   await page.close();
   remove();
@@ -131,8 +137,9 @@ async function measureLargeTrace() {
 
 if (!process.argv.includes("--large")) {
   await measureStart();
-  await measureTrace();
+  for (const one of [server, isolating]) await measureTrace(one);
 }
-await measureLargeTrace();
+for (const one of [server, isolating]) await measureLargeTrace(one);
 await chromium.close();
 server.end();
+isolating.end();

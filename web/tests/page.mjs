@@ -18,8 +18,16 @@ export const PATIENCE_MS = 600_000;
 
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".wasm": "application/wasm" };
 
-/** Serves the folder of the page; returns its address and how to end it. */
-export async function served() {
+/** The headers with which a server isolates the page. */
+export const ISOLATING = {
+  "cross-origin-opener-policy": "same-origin",
+  "cross-origin-embedder-policy": "require-corp",
+};
+
+/**
+ * Serves the folder of the page, with further headers and with changes of a file; returns its address and how to end it.
+ */
+export async function served(headers = {}, changed = (_, contents) => contents) {
   const server = createServer((request, answer) => {
     const path = new URL(request.url, "http://localhost").pathname;
     const file = join(dist, path.endsWith("/") ? `${path}index.html` : path);
@@ -28,8 +36,8 @@ export async function served() {
       return;
     }
     answer
-      .writeHead(200, { "content-type": TYPES[extname(file)] ?? "application/octet-stream" })
-      .end(readFileSync(file));
+      .writeHead(200, { "content-type": TYPES[extname(file)] ?? "application/octet-stream", ...headers })
+      .end(changed(path, readFileSync(file)));
   });
   await new Promise((ready) => server.listen(0, "127.0.0.1", ready));
   return { address: `http://127.0.0.1:${server.address().port}/`, end: () => server.close() };

@@ -1,45 +1,29 @@
 //! Independent items on all threads, with results in the order of the items.
 //!
 //! Sums over the results are formed by the caller, in that order, so that no number depends on the count of threads.
-//! Without the feature `threads` the items run one after another.
 
 use std::sync::Mutex;
+
+use rayon::prelude::*;
 
 /// `of(0)`, `of(1)`, … in order.
 ///
 /// The work is passed on without its type, so that the scheduler of the threads is compiled once for all callers.
 pub fn map<T: Send>(count: usize, of: &(dyn Fn(usize) -> T + Sync)) -> Vec<T> {
     let results: Vec<Mutex<Option<T>>> = (0..count).map(|_| Mutex::new(None)).collect();
-    each(count, &|index| {
+    let each: &(dyn Fn(usize) + Sync) = &|index| {
         let result = of(index);
         if let Ok(mut place) = results[index].lock() {
             *place = Some(result);
         }
-    });
+    };
+    (0..count).into_par_iter().for_each(each);
     results.into_iter().filter_map(|result| result.into_inner().ok().flatten()).collect()
 }
 
-#[cfg(feature = "threads")]
-fn each(count: usize, work: &(dyn Fn(usize) + Sync)) {
-    use rayon::prelude::*;
-    (0..count).into_par_iter().for_each(work);
-}
-
-#[cfg(not(feature = "threads"))]
-fn each(count: usize, work: &(dyn Fn(usize) + Sync)) {
-    (0..count).for_each(work);
-}
-
 /// Two independent computations at the same time.
-#[cfg(feature = "threads")]
 pub fn both<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
     rayon::join(a, b)
-}
-
-/// Two independent computations, one after the other.
-#[cfg(not(feature = "threads"))]
-pub fn both<A, B>(a: impl FnOnce() -> A, b: impl FnOnce() -> B) -> (A, B) {
-    (a(), b())
 }
 
 #[cfg(test)]
