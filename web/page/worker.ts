@@ -31,7 +31,7 @@ const INITIAL = 64;
 /** What it may reach, pages: a browser of 32 bits refuses the first. */
 const LARGEST = [65536, 32768, 16384, 8192];
 /** Most threads: each has a stack and its share of a computation in memory. */
-const MOST_THREADS = 16;
+const MOST_THREADS = 8;
 
 /** The memory of the module. Only an isolated page may give it to other workers. */
 function newMemory(): WebAssembly.Memory {

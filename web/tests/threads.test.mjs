@@ -31,7 +31,7 @@ async function computed(page, kind) {
   return { json: JSON.parse(await saved(page, "JSON")), processors: Number(await row.getAttribute("data-processors")) };
 }
 
-const count = (page) => page.evaluate(() => Math.min(navigator.hardwareConcurrency, 16));
+const count = (page) => page.evaluate(() => Math.min(navigator.hardwareConcurrency, 8));
 
 test("with the headers of a server all processors compute, with the numbers of the command", async () => {
   const server = await served(ISOLATING);
