@@ -129,7 +129,7 @@ fn products_serve_another_residual() {
         Gram::new(&columns, sets.clone(), Arc::new(model.clone()), residual, prior)
     };
     let other: Vec<f64> = residual.iter().enumerate().map(|(i, r)| 0.3 * r + (0.7 * i as f64).sin()).collect();
-    let (known, formed) = (of(&residual).with_residual(&other, &|| true).unwrap(), of(&other));
+    let (known, formed) = (of(&residual).with_residual(&other, &|| true).unwrap(), of(&other).keeping_nothing());
     let all: Vec<usize> = (0..columns.fold_rows.len()).collect();
     for folds in [all.clone(), all[1..].to_vec()] {
         let gains = |gram: &Gram<'_>| TrainedModel::new(gram, &[], &folds).unwrap().gains(&|_| true).unwrap();
@@ -143,8 +143,8 @@ fn products_serve_another_residual() {
     }
 }
 
-/// Candidates that come in parts, with null draws that are kept or formed again, have the gains and the best null scores of
-/// all candidates together.
+/// Candidates that come in parts, with null draws and arrays of projections that are kept or formed again, have the gains
+/// and the best null scores of all candidates together.
 #[test]
 fn candidates_in_parts_have_the_scores_of_all_together() {
     const DRAWS: usize = 5;
@@ -172,6 +172,9 @@ fn candidates_in_parts_have_the_scores_of_all_together() {
         |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-9 * a.abs());
     for kept_entries in [usize::MAX, 0] {
         let mut without = Gram::new(&columns, Vec::new(), Arc::clone(&model), &residual, prior());
+        if kept_entries == 0 {
+            without = without.keeping_nothing();
+        }
         without.take_draws(&draws, Some(kept_entries), &|| true).unwrap();
         let (mut in_parts, mut best_in_parts) = (Vec::new(), vec![f64::NEG_INFINITY; DRAWS]);
         for part in sets.chunks(7) {
@@ -185,17 +188,14 @@ fn candidates_in_parts_have_the_scores_of_all_together() {
     }
 }
 
-/// A circle of 12,000 positions, read twice: its states are shared among several tasks, whose sums add up.
-#[test]
-fn gains_of_a_long_session_are_those_of_least_squares() {
-    const POSITIONS: usize = 12_000;
+/// A circle of some positions, read several times, with a harmonic and something like noise; and its fit.
+fn circle(positions: usize, runs: usize) -> (Problem, Vec<f64>) {
     let folder = tempfile::tempdir().unwrap();
     let mut table = String::from("run,x_mm,y_mm,length_mm\n");
-    for i in 0..2 * POSITIONS {
-        let (sin, cos) = (std::f64::consts::TAU * (i % POSITIONS) as f64 / POSITIONS as f64).sin_cos();
-        // Readings with a harmonic and something like noise.
+    for i in 0..runs * positions {
+        let (sin, cos) = (std::f64::consts::TAU * (i % positions) as f64 / positions as f64).sin_cos();
         let length = 100.0 + 1e-3 * (3.0 * sin * cos + ((i * i) as f64).sin());
-        writeln!(table, "{},{:.9},{:.9},{length:.9}", 1 + i / POSITIONS, -100.0 * cos, -100.0 * sin).unwrap();
+        writeln!(table, "{},{:.9},{:.9},{length:.9}", 1 + i / positions, -100.0 * cos, -100.0 * sin).unwrap();
     }
     std::fs::write(folder.path().join("circle.csv"), table).unwrap();
     let text = "[machine]\nchain = \"w b Y X t\"\n[machine.axis.X]\n[machine.axis.Y]\n[instrument]\nkind = \"ballbar\"\n\
@@ -204,8 +204,48 @@ fn gains_of_a_long_session_are_those_of_least_squares() {
     let file = folder.path().join("session.toml");
     std::fs::write(&file, text).unwrap();
     let (problem, fit) = prepare(&abbe_files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
-    let columns = Columns::new(&problem, &fit.beta);
-    let (model, residual) = model(&columns, &fit.beta);
+    (problem, fit.beta)
+}
+
+/// Columns of several candidates with draws are the products of their rows: of a circle that is read again and again, and of
+/// readings in autocorrelated noise.
+#[test]
+fn products_with_draws_are_those_of_the_rows() {
+    const DRAWS: usize = 20;
+    for (problem, beta) in [circle(150, 5), problem(&[0.5, 0.2])] {
+        let columns = Columns::new(&problem, &beta);
+        let (model, residual) = model(&columns, &beta);
+        let sets = candidates(&problem, &columns, 23);
+        let rank = model.ncols();
+        let prior = PriorGram { base: Mat::zeros(rank, rank), base_y: vec![0.0; rank] };
+        let count = residual.len();
+        let draw = move |k: usize| -> Vec<f64> { (0..count).map(|i| ((i * (k + 3) + k) as f64).sin()).collect() };
+        let draws = Given(DRAWS, draw);
+        let mut gram = Gram::new(&columns, sets.clone(), Arc::new(model.clone()), &residual, prior);
+        gram.take_draws(&draws, None, &|| true).unwrap();
+        let found = gram.null_products(0).unwrap();
+        let own = rows(&columns, &sets.iter().collect::<Vec<_>>());
+        assert!(sets.len() > 20 && found.ncols() == own.ncols());
+        let drawn = Mat::from_fn(count, DRAWS, |i, k| draw(k)[i]);
+        let without_model = &drawn - &model * (model.transpose() * &drawn);
+        let expected = without_model.transpose() * &own;
+        for j in 0..own.ncols() {
+            // Draws are held in single precision.
+            let scale = own.col(j).norm_l2() * (count as f64).sqrt();
+            for k in 0..DRAWS {
+                let (found, expected) = (found[(k, j)], expected[(k, j)]);
+                assert!((found - expected).abs() <= 1e-6 * scale, "{j} {k}: {found} {expected} of {scale}");
+            }
+        }
+    }
+}
+
+/// A circle of 12,000 positions, read twice: its states are shared among several tasks, whose sums add up.
+#[test]
+fn gains_of_a_long_session_are_those_of_least_squares() {
+    let (problem, beta) = circle(12_000, 2);
+    let columns = Columns::new(&problem, &beta);
+    let (model, residual) = model(&columns, &beta);
     let all = library::candidates(&problem).unwrap();
     let sets: Vec<EffectColumns> =
         all.iter().step_by(all.len() / 30).filter_map(|member| columns.effect_columns(&member.effect)).collect();

@@ -34,6 +34,9 @@ const MIN_STATES_PER_TASK: usize = 4096;
 /// Largest number of tasks among which the states are shared. Each holds the sums of its columns.
 const MAX_PIECES: usize = 8;
 
+/// Least number of vectors for which readings of equal sensitivities are sought.
+const MIN_VECTORS_OF_REPEATS: usize = 16;
+
 /// The candidates of a segment by states, basis and channel.
 pub(super) struct Layout {
     groups: Vec<Group>,
@@ -152,6 +155,19 @@ impl Layout {
         self.square[candidate]..self.square[candidate + 1]
     }
 
+    /// The states of each group in some whitened rows, which combine the scalar readings `rows`, for products with so many
+    /// vectors.
+    pub fn places(&self, training: &TrainingRows, rows: &[(u32, u32)], vectors: usize) -> Vec<LocalStates> {
+        parallel::map(self.groups.len(), &|k| {
+            let Group { states, channels, .. } = &self.groups[k];
+            let mut local = LocalStates::of(states, training, rows);
+            if vectors >= MIN_VECTORS_OF_REPEATS {
+                local.find_repeats(channels, rows);
+            }
+            local
+        })
+    }
+
     /// The products of all columns with some vectors and, if `with_own`, of each candidate with itself, over some
     /// whitened rows. `None` if `should_continue` returns `false`.
     pub fn products<T: Copy + Into<f64> + Sync>(
@@ -161,9 +177,20 @@ impl Layout {
         with_own: bool,
         should_continue: &(dyn Fn() -> bool + Sync),
     ) -> Option<Products> {
+        let places = self.places(training, &side.rows, side.values.nrows());
+        self.products_at(&places, training, side, with_own, should_continue)
+    }
+
+    /// The same at known [`Layout::places`].
+    pub fn products_at<T: Copy + Into<f64> + Sync>(
+        &self,
+        local: &[LocalStates],
+        training: &TrainingRows,
+        side: &Adjoint<T>,
+        with_own: bool,
+        should_continue: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Products> {
         let vectors = side.values.nrows();
-        let local =
-            parallel::map(self.groups.len(), &|k| LocalStates::of(&self.groups[k].states, training, &side.rows));
         let mut tasks = Vec::new();
         for (number, group) in self.groups.iter().enumerate() {
             let at_once = (MAX_VECTORS / vectors.max(1)).max(1);

@@ -43,6 +43,8 @@ const MAX_NULL_ENTRIES: usize = 4_000_000;
 /// Number of entries of all null draws up to which a search best keeps them for candidates to come: 128 MB. A search that
 /// finds nothing adds no candidates.
 pub const MAX_KEPT_DRAWS: usize = 32_000_000;
+/// Number of entries up to which an array of a projection that can be formed anew is kept: 64 MB.
+const MAX_KEPT_ENTRIES: usize = 8_000_000;
 
 /// The priors as products with the model columns.
 pub struct PriorGram {
@@ -83,6 +85,8 @@ pub struct Gram<'c> {
     null_products: Store<usize, Mat<f64>>,
     /// By training folds.
     projections: Store<Vec<usize>, Projection>,
+    /// Number of entries up to which a projection keeps what it can form anew.
+    kept_entries: usize,
 }
 
 /// Null draws with the model projected out: some draws, one part after another. They are the largest array of a trace of few
@@ -153,6 +157,7 @@ impl<'c> Gram<'c> {
             null: Arc::default(),
             null_products: Arc::default(),
             projections: Arc::default(),
+            kept_entries: MAX_KEPT_ENTRIES,
         };
         gram.append(sets);
         gram
@@ -176,12 +181,14 @@ impl<'c> Gram<'c> {
         let kept = kept_entries.is_some_and(|most| self.draws * self.residual.len() <= most);
         let mut products = Mat::zeros(self.draws, layout.total());
         let mut null = NullDraws::new();
+        let mut places = None;
         if kept || layout.total() > 0 {
             self.in_parts(&whole, draws, |first, side| {
                 if !should_continue() {
                     return Err(IdentifyError::Interrupted);
                 }
-                let formed = layout.products(&whole.training, &side, false, should_continue);
+                let places = places.get_or_insert_with(|| layout.places(&whole.training, &side.rows, self.draws));
+                let formed = layout.products_at(places, &whole.training, &side, false, should_continue);
                 let formed = formed.ok_or(IdentifyError::Interrupted)?.side;
                 products.as_mut().subrows_mut(first, formed.nrows()).copy_from(&formed);
                 if kept {
@@ -272,6 +279,12 @@ impl<'c> Gram<'c> {
         let other = Gram { residual: Arc::new(residual.to_vec()), projections: Arc::default(), ..self.clone() };
         other.projection(&other.all_folds())?.take_products(&other, 0, &known, should_continue)?;
         Ok(other)
+    }
+
+    /// The same with everything formed anew, as in a long session.
+    #[cfg(test)]
+    pub fn keeping_nothing(self) -> Gram<'c> {
+        Gram { kept_entries: 0, ..self }
     }
 
     /// Adds candidates as a segment of their own.
@@ -377,8 +390,10 @@ impl<'c> Gram<'c> {
             let layout = &self.segments[segment].layout;
             let mut products = Mat::zeros(self.draws, layout.total());
             let mut first = 0;
+            let rows = null.first().map(|part| Arc::clone(&part.rows)).unwrap_or_default();
+            let places = layout.places(&whole.training, &rows, self.draws);
             for part in null.iter() {
-                let formed = layout.products(&whole.training, part, false, &|| true);
+                let formed = layout.products_at(&places, &whole.training, part, false, &|| true);
                 let formed = formed.ok_or(IdentifyError::Interrupted)?.side;
                 products.as_mut().subrows_mut(first, formed.nrows()).copy_from(&formed);
                 first += formed.nrows();

@@ -24,8 +24,6 @@ use crate::candidates::columns::{Adjoint, EffectColumns, TrainingRows};
 
 /// Share of the largest entry below which a pivot of the model rows of a fold is a rounding error.
 const PIVOT_ROUNDING: f64 = 1e-13;
-/// Number of entries up to which what can be formed anew is kept: 64 MB.
-const MAX_KEPT_ENTRIES: usize = 8_000_000;
 /// Share of the product over all rows below which a product without some folds is a rounding error.
 const PRODUCT_ROUNDING: f64 = 1e-12;
 
@@ -160,7 +158,7 @@ impl Projection {
     /// The residual of the model over all rows in fold order; zero outside the training folds.
     pub fn residual(&self, gram: &Gram<'_>) -> Cow<'_, Mat<f64>> {
         let of_all_projections = gram.residual.len() * (1 + gram.columns.fold_rows.len());
-        match of_all_projections > MAX_KEPT_ENTRIES {
+        match of_all_projections > gram.kept_entries {
             true => Cow::Owned(self.formed_residual(gram)),
             false => Cow::Borrowed(self.residual.get_or_init(|| self.formed_residual(gram))),
         }
@@ -226,7 +224,7 @@ impl Projection {
             side.as_mut().subcols_mut(rank, 1).copy_from(&*self.residual(gram));
             Arc::new(Adjoint::of(&self.training, side.as_ref()))
         };
-        let is_large = gram.residual.len() * (gram.rank() + 1) > MAX_KEPT_ENTRIES;
+        let is_large = gram.residual.len() * (gram.rank() + 1) > gram.kept_entries;
         if self.left_out.is_some() || is_large { formed() } else { Arc::clone(self.side.get_or_init(formed)) }
     }
 

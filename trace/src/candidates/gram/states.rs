@@ -1,5 +1,6 @@
 //! Sums over the states of a driver: of the readings of some rows, and of the products of a column with itself.
 
+use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -12,6 +13,8 @@ use crate::candidates::columns::{Adjoint, Channel, DriverStates, SensitivityValu
 /// Largest distance of two states whose readings one whitened row combines. Beyond it the rows are multiplied.
 const MAX_BAND: usize = 32;
 const NONE: u32 = u32::MAX;
+/// An odd number without a pattern in its bits (2⁶⁴ over the golden ratio), for keys of sensitivities.
+const MIXING: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// The states that occur in some rows.
 pub(super) struct LocalStates {
@@ -22,9 +25,23 @@ pub(super) struct LocalStates {
     /// The scalar readings that the rows combine, by state: those of state `k` are `by_state[ends[k - 1]..ends[k]]`.
     by_state: Vec<u32>,
     ends: Vec<usize>,
+    /// Readings of a state with equal sensitivities, if they were sought and are many.
+    repeats: Option<Repeats>,
     /// The largest distance of two states that one whitened row combines.
     band: usize,
 }
+
+/// The readings of each state in sets of equal sensitivities in all channels of a group. Their sum is formed before it is
+/// multiplied with the sensitivities: a sweep is mostly repeated over the same positions.
+struct Repeats {
+    /// The end of each set in `by_state`.
+    ends: Vec<u32>,
+    /// For each state the number of sets up to it.
+    of_states: Vec<u32>,
+}
+
+/// Least number of readings of a set, on average.
+const MIN_REPEATS: usize = 2;
 
 impl LocalStates {
     /// Of some whitened rows. `rows` are the scalar readings that they combine.
@@ -53,7 +70,7 @@ impl LocalStates {
             next[*place as usize] += 1;
         }
         ends.remove(0);
-        let mut local = LocalStates { states: present, place, by_state, ends, band: 0 };
+        let mut local = LocalStates { states: present, place, by_state, ends, repeats: None, band: 0 };
         if training.filter.is_pointwise() {
             return local;
         }
@@ -67,6 +84,57 @@ impl LocalStates {
             }
         }
         local
+    }
+
+    /// Seeks the readings of each state that have the same sensitivities in all of some channels, and puts them one after
+    /// another. `rows` are the scalar readings.
+    pub fn find_repeats(&mut self, channels: &[Arc<Channel>], rows: &[(u32, u32)]) {
+        let most = self.by_state.len() / MIN_REPEATS;
+        if self.count() > most {
+            return;
+        }
+        let sensitivities = Sensitivities::of(channels);
+        let of_row = |row: u32| {
+            let (test, scalar) = rows[row as usize];
+            sensitivities.of_test(test).iter().map(move |values| values.at(scalar as usize).to_bits())
+        };
+        let mut firsts: Vec<u32> = Vec::new();
+        let mut known: HashMap<u64, u32> = HashMap::new();
+        let mut of_states = Vec::with_capacity(self.ends.len());
+        let mut set_of = vec![0; self.by_state.len()];
+        let mut start = 0;
+        for (state, end) in self.ends.iter().enumerate() {
+            let of_before = firsts.len();
+            for place in start..*end {
+                let row = self.by_state[place];
+                let mixed = |key: u64, bits: u64| (key.rotate_left(23) ^ bits).wrapping_mul(MIXING);
+                let set = *known.entry(of_row(row).fold(state as u64, mixed)).or_insert(firsts.len() as u32) as usize;
+                // Other readings with the same key are sets of their own.
+                let same = firsts.get(set).filter(|_| set >= of_before);
+                let is_equal = same.is_some_and(|first| of_row(*first).eq(of_row(row)));
+                set_of[place] = if is_equal { set as u32 } else { firsts.len() as u32 };
+                if !is_equal {
+                    firsts.push(row);
+                }
+            }
+            if firsts.len() > most {
+                return;
+            }
+            of_states.push(firsts.len() as u32);
+            start = *end;
+        }
+        let mut ends = vec![0_u32; firsts.len()];
+        set_of.iter().for_each(|set| ends[*set as usize] += 1);
+        (1..ends.len()).for_each(|k| ends[k] += ends[k - 1]);
+        // From the last reading back: the end of a set becomes its start.
+        let mut places = ends.clone();
+        let mut by_state = vec![0; self.by_state.len()];
+        for (row, set) in self.by_state.iter().zip(&set_of).rev() {
+            places[*set as usize] -= 1;
+            by_state[places[*set as usize] as usize] = *row;
+        }
+        self.by_state = by_state;
+        self.repeats = Some(Repeats { ends, of_states });
     }
 
     /// The index among these states of that of a scalar reading.
@@ -120,26 +188,66 @@ impl<T: Copy + Into<f64>> NullaryFnOnce for Gathering<'_, T> {
     fn call(self) {
         let Gathering { local, states, channels, side, mut sums } = self;
         let vectors = side.values.nrows();
-        let tests = channels.first().map_or(0, |channel| channel.sensitivity.len());
-        let sensitivities: Vec<Vec<SensitivityValues<'_>>> = (0..tests)
-            .map(|test| channels.iter().map(|channel| channel.sensitivity[test].values()).collect())
-            .collect();
+        let sensitivities = Sensitivities::of(channels);
+        let mut total = vec![0.0; vectors];
         sums.fill(0.0);
         for (state, to) in states.zip(sums.col_iter_mut()) {
             let Some(to) = to.try_as_col_major_mut() else { continue };
             let to = to.as_slice_mut();
-            let start = if state == 0 { 0 } else { local.ends[state - 1] };
-            for row in &local.by_state[start..local.ends[state]] {
-                let (test, scalar) = side.rows[*row as usize];
-                let values = side.values.col_as_slice(*row as usize);
-                let of_channels = sensitivities[test as usize].iter();
-                for (sensitivity, to) in of_channels.zip(to.chunks_exact_mut(vectors.max(1))) {
-                    let factor = sensitivity.at(scalar as usize);
-                    // Most readings are outside the run of a term of one run.
-                    if factor != 0.0 {
-                        add_multiple(to, factor, values);
+            match &local.repeats {
+                None => {
+                    let start = if state == 0 { 0 } else { local.ends[state - 1] };
+                    for row in &local.by_state[start..local.ends[state]] {
+                        let values = side.values.col_as_slice(*row as usize);
+                        sensitivities.add(side.rows[*row as usize], values, to);
                     }
                 }
+                Some(repeats) => {
+                    for rows in repeats.of(state).map(|range| &local.by_state[range]) {
+                        total.fill(0.0);
+                        rows.iter()
+                            .for_each(|row| add_multiple(&mut total, 1.0, side.values.col_as_slice(*row as usize)));
+                        sensitivities.add(side.rows[rows[0] as usize], &total, to);
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Repeats {
+    /// The sets of a state, as ranges of the readings by state.
+    fn of(&self, state: usize) -> impl Iterator<Item = Range<usize>> {
+        let first = if state == 0 { 0 } else { self.of_states[state - 1] as usize };
+        (first..self.of_states[state] as usize).map(|set| {
+            let start = if set == 0 { 0 } else { self.ends[set - 1] };
+            start as usize..self.ends[set] as usize
+        })
+    }
+}
+
+/// The sensitivities of some channels, by test.
+struct Sensitivities<'c>(Vec<Vec<SensitivityValues<'c>>>);
+
+impl<'c> Sensitivities<'c> {
+    fn of(channels: &'c [Arc<Channel>]) -> Sensitivities<'c> {
+        let tests = channels.first().map_or(0, |channel| channel.sensitivity.len());
+        let of_test = |test: usize| channels.iter().map(|channel| channel.sensitivity[test].values()).collect();
+        Sensitivities((0..tests).map(of_test).collect())
+    }
+
+    fn of_test(&self, test: u32) -> &[SensitivityValues<'c>] {
+        &self.0[test as usize]
+    }
+
+    /// Adds values at a scalar reading times the sensitivity of each channel.
+    #[inline(always)]
+    fn add<T: Copy + Into<f64>>(&self, (test, scalar): (u32, u32), values: &[T], to: &mut [f64]) {
+        for (sensitivity, to) in self.of_test(test).iter().zip(to.chunks_exact_mut(values.len().max(1))) {
+            let factor = sensitivity.at(scalar as usize);
+            // Most readings are outside the run of a term of one run.
+            if factor != 0.0 {
+                add_multiple(to, factor, values);
             }
         }
     }
