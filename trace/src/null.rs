@@ -405,6 +405,97 @@ mod tests {
         }
     }
 
+    /// The window of a reading near an end reaches to that end. Of a rise by one per reading, the distance from the middle of
+    /// the window remains; of an even number of readings the upper one is the middle.
+    #[test]
+    fn the_running_median_reaches_to_both_ends() {
+        const ROWS: usize = 60;
+        let residual: Vec<f64> = (0..ROWS).map(|row| row as f64).collect();
+        let rough = without_smooth(&residual, 1);
+        for from_end in 0..SMOOTHING {
+            let middle = (from_end + SMOOTHING).div_ceil(2);
+            assert_eq!(rough[from_end], from_end as f64 - middle as f64, "{from_end}");
+            assert_eq!(rough[ROWS - 1 - from_end], SMOOTHING as f64 - middle as f64, "{from_end}");
+        }
+        assert!(rough[SMOOTHING..ROWS - SMOOTHING].iter().all(|left| *left == 0.0));
+        // Fewer readings than a window have one median.
+        assert_eq!(without_smooth(&[1.0, 5.0, 2.0], 1), [-1.0, 3.0, 0.0]);
+    }
+
+    /// The readings of one pose keep their signs relative to each other; poses get theirs independently.
+    #[test]
+    fn one_sign_for_each_pose() {
+        const DRAWS: usize = 400;
+        let mut generator = Pcg64::seed_from_u64(5);
+        let whitened = [1.0, -2.0, 3.0, 4.0];
+        let draws: Vec<Vec<f64>> = (0..DRAWS).map(|_| sign_flipped(&[2, 0, 2, 1], &whitened, &mut generator)).collect();
+        let signs: Vec<[f64; 4]> = draws.iter().map(|draw| std::array::from_fn(|k| draw[k] / whitened[k])).collect();
+        assert!(signs.iter().all(|signs| signs[0] == signs[2] && signs.iter().all(|sign| sign.abs() == 1.0)));
+        for (a, b) in [(0, 1), (0, 3), (1, 3)] {
+            let equal = signs.iter().filter(|signs| signs[a] == signs[b]).count() as f64;
+            // Within four standard deviations of a fair coin.
+            assert!((equal - 200.0).abs() < 40.0, "{a} {b}: {equal}");
+        }
+    }
+
+    /// The answer to a pulse is the series of `A/A*`, by the division of the polynomials.
+    #[test]
+    fn a_draw_has_the_spectrum_of_its_coefficients_over_that_of_the_whitening() {
+        let mut generator = Pcg64::seed_from_u64(6);
+        let pulse = || [1.0, 0.0, 0.0, 0.0, 0.0];
+        let answer = |found: &[f64], first: f64, u: f64, generator: &mut Pcg64| {
+            let mut values = pulse();
+            Spectrum { found: found.to_vec(), first, u }.give(&mut values, generator);
+            values
+        };
+        let series = |a: [f64; 3], own: [f64; 3]| {
+            let mut series = [0.0; 5];
+            for t in 0..5 {
+                let of_before: f64 = (1..=t.min(2)).map(|lag| own[lag] * series[t - lag]).sum();
+                series[t] = a.get(t).copied().unwrap_or(0.0) - of_before;
+            }
+            series
+        };
+        let near = |found: [f64; 5], expected: [f64; 5]| {
+            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14), "{found:?} {expected:?}");
+        };
+        let one = answer(&[0.5], 0.3, 0.0, &mut generator);
+        near(one, [1.0, -0.2, -0.06, -0.018, -0.0054]);
+        let two = answer(&[0.5, 0.2], 0.3, 0.0, &mut generator);
+        near(two, series([1.0, -0.5, -0.2], [1.0, -0.3, -0.2]));
+        // The same coefficients leave the draw as it is, and so does an estimate of nothing without an uncertainty.
+        near(answer(&[0.5, 0.2], 0.5, 0.0, &mut generator), pulse());
+        near(answer(&[], 0.0, 0.0, &mut generator), pulse());
+        // However uncertain, the sum of the coefficients stays that of a stationary process, at either bound.
+        let mut seen = [false; 2];
+        for _ in 0..50 {
+            let far = answer(&[0.5, 0.2], 0.5, 1e6, &mut generator);
+            let bounds = [MAX_AR_SUM, -MAX_AR_SUM];
+            let at = bounds.iter().position(|sum| (far[1] - (sum - 0.2 - 0.5)).abs() < 1e-9);
+            seen[at.unwrap_or_else(|| panic!("{far:?}"))] = true;
+        }
+        assert_eq!(seen, [true; 2]);
+    }
+
+    /// Without a trend every reading of a block has its own sign; with one the block has one sign.
+    #[test]
+    fn signs_of_a_block() {
+        const LENGTH: usize = 200;
+        let mut generator = Pcg64::seed_from_u64(7);
+        let stretch = |trend| Stretch { values: vec![2.0; LENGTH], trend, channels: 1 };
+        let mut drawn = |stretch: &Stretch| {
+            let mut values = Vec::new();
+            stretch.draw(0..LENGTH, &mut values, &mut generator);
+            assert!(values.len() == LENGTH && values.iter().all(|value| value.abs() == 2.0), "{values:?}");
+            values.iter().filter(|value| **value > 0.0).count()
+        };
+        let positive = drawn(&stretch(Vec::new()));
+        assert!((70..=130).contains(&positive), "{positive}");
+        for _ in 0..8 {
+            assert_eq!(drawn(&stretch(vec![[0.0; TERMS]; LENGTH])) % LENGTH, 0);
+        }
+    }
+
     /// Runs of 63 readings that have lost their trend, as pure error has. The sum over a block of 20 draws has the variance
     /// of 20 independent readings, and so has the difference of neighbours. Without the trend it has less than half.
     #[test]
