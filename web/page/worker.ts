@@ -57,11 +57,11 @@ async function start({ module, faults }: Start): Promise<WebAssembly.Memory> {
   return memory;
 }
 
-/** Starts a worker of the pool; false if the browser gives none. */
+/** Starts a worker of the pool; false if the browser gives none, or not the memory that it needs. */
 function isJoined(join: Join): Promise<boolean> {
   return new Promise((resolve) => {
     const worker = new Worker(location.href, { type: "module" });
-    worker.onmessage = () => resolve(true);
+    worker.onmessage = ({ data }: MessageEvent<boolean>) => resolve(data);
     worker.onerror = () => resolve(false);
     worker.postMessage({ join });
   });
@@ -69,8 +69,12 @@ function isJoined(join: Join): Promise<boolean> {
 
 /** Works as a thread of the pool until it is ended. The worker that computes waits for it and hears of no fault. */
 async function join({ module, memory, faults }: Join): Promise<void> {
-  await init({ module_or_path: module, memory });
-  postMessage("joined");
+  const isReady = await init({ module_or_path: module, memory }).then(
+    () => true,
+    () => false,
+  );
+  postMessage(isReady);
+  if (!isReady) return;
   try {
     workInPool();
   } catch (error) {

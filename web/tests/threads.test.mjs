@@ -90,6 +90,23 @@ for (const [what, headers, spoil] of [
   });
 }
 
+test("a worker that does not get its memory is left out", async () => {
+  const server = await served(ISOLATING, (path, contents) => {
+    if (!/worker-[^/]*\.js$/.test(path)) return contents;
+    const text = contents.toString();
+    const refused = text.replace(".then(()=>!0,()=>!1)", ".then(()=>!1)");
+    assert.notEqual(refused, text);
+    return refused;
+  });
+  const context = await own.chromium.newContext({ serviceWorkers: "block" });
+  const { page, wrong } = await opening(await context.newPage(), server.address);
+  await give(page, filesOf(hermle));
+  assert.equal((await computed(page, "Fit")).processors, 1);
+  assert.deepEqual(wrong, []);
+  await context.close();
+  server.end();
+});
+
 test("without headers the service worker of the first visit isolates the second", async () => {
   const server = await served();
   const context = await own.chromium.newContext();
