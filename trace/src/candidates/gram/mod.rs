@@ -85,8 +85,8 @@ pub struct Gram<'c> {
     null_products: Store<usize, Mat<f64>>,
     /// By training folds.
     projections: Store<Vec<usize>, Projection>,
-    /// Number of entries up to which a projection keeps what it can form anew.
-    kept_entries: usize,
+    /// Number of entries up to which projections keep what they can form anew.
+    kept_by_projections: usize,
 }
 
 /// Null draws with the model projected out: some draws, one part after another. They are the largest array of a trace of few
@@ -157,7 +157,7 @@ impl<'c> Gram<'c> {
             null: Arc::default(),
             null_products: Arc::default(),
             projections: Arc::default(),
-            kept_entries: MAX_KEPT_ENTRIES,
+            kept_by_projections: MAX_KEPT_ENTRIES,
         };
         gram.append(sets);
         gram
@@ -284,7 +284,7 @@ impl<'c> Gram<'c> {
     /// The same with everything formed anew, as in a long session.
     #[cfg(test)]
     pub fn keeping_nothing(self) -> Gram<'c> {
-        Gram { kept_entries: 0, ..self }
+        Gram { kept_by_projections: 0, ..self }
     }
 
     /// Adds candidates as a segment of their own.

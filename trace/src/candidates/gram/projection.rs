@@ -158,7 +158,7 @@ impl Projection {
     /// The residual of the model over all rows in fold order; zero outside the training folds.
     pub fn residual(&self, gram: &Gram<'_>) -> Cow<'_, Mat<f64>> {
         let of_all_projections = gram.residual.len() * (1 + gram.columns.fold_rows.len());
-        match of_all_projections > gram.kept_entries {
+        match of_all_projections > gram.kept_by_projections {
             true => Cow::Owned(self.formed_residual(gram)),
             false => Cow::Borrowed(self.residual.get_or_init(|| self.formed_residual(gram))),
         }
@@ -224,7 +224,7 @@ impl Projection {
             side.as_mut().subcols_mut(rank, 1).copy_from(&*self.residual(gram));
             Arc::new(Adjoint::of(&self.training, side.as_ref()))
         };
-        let is_large = gram.residual.len() * (gram.rank() + 1) > gram.kept_entries;
+        let is_large = gram.residual.len() * (gram.rank() + 1) > gram.kept_by_projections;
         if self.left_out.is_some() || is_large { formed() } else { Arc::clone(self.side.get_or_init(formed)) }
     }
 
