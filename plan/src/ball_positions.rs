@@ -38,11 +38,9 @@ pub(super) fn ball_positions(
     for &about in rotary.iter().filter(|axis| (**axis < machine.workpiece_side) == on_table) {
         let axis = &machine.axes[about];
         let across = across(axis.direction);
-        let carries_table = on_table && about == 0;
         for &radius in &variations.radii_mm {
             for &height in &variations.heights_mm {
-                let both = if carries_table || height == 0.0 { &[1.0][..] } else { &[1.0, -1.0][..] };
-                for sign in both {
+                for sign in sides(on_table, about, height) {
                     let up = if axis.direction[2] < 0.0 { -1.0 } else { 1.0 };
                     let ball: [f64; 3] = std::array::from_fn(|i| {
                         axis.origin_mm[i] + up * sign * height * axis.direction[i] + radius * across[i]
@@ -56,6 +54,22 @@ pub(super) fn ball_positions(
         }
     }
     positions
+}
+
+/// The largest possible number of [`ball_positions`], counted before any is made: positions may coincide.
+pub(super) fn ball_count(session: &Session, variations: &TestVariations, rotary: &[usize], on_table: bool) -> f64 {
+    let mounted = if on_table { session.tests.len() } else { 0 };
+    let about = rotary.iter().filter(|axis| (**axis < session.machine.workpiece_side) == on_table);
+    let heights = |axis: &usize| -> usize {
+        variations.heights_mm.iter().map(|height| sides(on_table, *axis, *height).len()).sum()
+    };
+    mounted as f64 + about.map(heights).sum::<usize>() as f64 * variations.radii_mm.len() as f64
+}
+
+/// The sides of a rotary axis on which balls at a height along it are candidates: nothing is below the table.
+fn sides(on_table: bool, axis: usize, height: f64) -> &'static [f64] {
+    let carries_table = on_table && axis == 0;
+    if carries_table || height == 0.0 { &[1.0] } else { &[1.0, -1.0] }
 }
 
 /// A unit vector perpendicular to an axis: the projection of R's Y, or of Z if the axis is close to Y.
@@ -151,6 +165,10 @@ mod tests {
         near(balls_about(0), &[[0.0, 60.0], [25.0, 60.0], [0.0, 90.0], [25.0, 90.0]]);
         let both = [[0.0, 60.0], [25.0, 60.0], [-25.0, 60.0], [0.0, 90.0], [25.0, 90.0], [-25.0, 90.0]];
         near(balls_about(1), &both);
+        // Counted beforehand: no test of this session has a ball.
+        for (about, count) in [(0, 4.0), (1, 6.0)] {
+            assert_eq!(ball_count(&session, &variations, &[about], true), count);
+        }
         // Axes of the other side carry no ball of the table.
         assert!(ball_positions(&session, session.instrument, &variations, &[0, 1], false).is_empty());
     }

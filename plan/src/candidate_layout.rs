@@ -8,7 +8,7 @@ use abbe_model::session::motion::{FollowOffset, Motion};
 use abbe_model::session::{Prior, Session, Test, placing};
 use abbe_model::words::{counted, listed};
 
-use super::ball_positions::{BallPosition, axis_positions, ball_positions, dot, norm, standing_positions};
+use super::ball_positions::{BallPosition, axis_positions, ball_count, ball_positions, dot, norm, standing_positions};
 use super::sweep::{Sweep, sweep_of};
 use super::test_variations::TestVariations;
 use crate::PlanError;
@@ -52,12 +52,8 @@ pub(super) fn draft_count(session: &Session, variations: &TestVariations) -> f64
     let rotary: Vec<usize> =
         (0..machine.axes.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary).collect();
     let count = |list: usize| list as f64;
-    let heights: f64 = variations.heights_mm.iter().map(|height| if *height == 0.0 { 1.0 } else { 2.0 }).sum();
-    let [balls_on_table, balls_in_spindle] = [true, false].map(|on_table| {
-        let about = rotary.iter().filter(|axis| (**axis < machine.workpiece_side) == on_table).count();
-        let mounted = if on_table { session.tests.len() } else { 0 };
-        count(mounted) + count(about) * count(variations.radii_mm.len()) * heights
-    });
+    let [balls_on_table, balls_in_spindle] =
+        [true, false].map(|on_table| ball_count(session, variations, &rotary, on_table));
     let sweeps = count(variations.ranges.len()) * count(variations.both_directions.len());
     // The other ball lies on either side of the circle; linear axes follow in three ways.
     let bars = 2.0 * count(variations.bars_mm.len()) + if variations.follow { 3.0 } else { 0.0 };

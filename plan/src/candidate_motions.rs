@@ -26,7 +26,7 @@ use abbe_model::session::motion::{FollowOffset, Motion};
 use abbe_model::session::{Prior, Session, Test, placing};
 use abbe_model::words::{listed, number};
 
-use super::ball_positions::{BallPosition, axis_positions, ball_positions, dot, standing_positions};
+use super::ball_positions::{BallPosition, axis_positions, ball_count, ball_positions, dot, standing_positions};
 use super::candidate_layout::{Draft, MAX_DRAFTS, too_many};
 use super::test_variations::TestVariations;
 use crate::PlanError;
@@ -87,13 +87,13 @@ pub(super) fn drafts(
     let templates: Vec<Template<'_>> =
         templates.into_iter().map(|(test, station)| Template { session, variations, test, station }).collect();
     // What is in contact needs one of them: every place on the table is a candidate.
-    let in_contact = templates.first().and_then(Template::contacts);
-    let count = templates.iter().map(Template::count_of_one_axis).sum::<usize>()
-        + in_contact.as_ref().map_or(0, Contacts::count);
-    if count > MAX_DRAFTS {
-        let found = format!("some {count} candidate tests of {}", kind.entry().phrase);
+    let count = templates.iter().map(Template::count_of_one_axis).sum::<f64>()
+        + templates.first().map_or(0.0, Template::count_in_contact);
+    if count > MAX_DRAFTS as f64 {
+        let found = format!("up to {} candidate tests of {}", number(count), kind.entry().phrase);
         return Err(too_many(found, variations, false));
     }
+    let in_contact = templates.first().and_then(Template::contacts);
     let mut drafts: Vec<Draft> = templates.iter().flat_map(Template::moves_of_one_axis).collect();
     drafts.extend(in_contact.iter().flat_map(Contacts::drafts));
     // Numbers are compared by their digits, which tell any two apart.
@@ -128,9 +128,42 @@ impl Template<'_> {
     }
 
     /// How often one axis moves while the others stand, with the instrument set up in one way.
-    fn count_of_one_axis(&self) -> usize {
+    fn count_of_one_axis(&self) -> f64 {
         let axes = 0..self.machine().axes.len();
-        axes.map(|axis| self.postures(axis).len() * self.ranges(axis).count()).sum()
+        axes.map(|axis| self.postures(axis).len() as f64 * self.count_of_ranges(axis)).sum()
+    }
+
+    /// The number of [`Template::ranges`].
+    fn count_of_ranges(&self, axis: usize) -> f64 {
+        let TestVariations { ranges, both_directions, feeds, .. } = self.variations;
+        let own = range(self.session, axis).map_or(0.0, |_| 1.0);
+        own * [ranges.len(), both_directions.len(), feeds.len()].map(|count| count as f64).iter().product::<f64>()
+    }
+
+    /// The largest possible number of candidates with two points in contact.
+    fn count_in_contact(&self) -> f64 {
+        let approaches = self.station.approaches().len() as f64;
+        if approaches == 0.0 {
+            return 0.0;
+        }
+        let rotary = self.rotary();
+        let turns = rotary.iter().map(|axis| {
+            axis_positions(self.session, self.variations, &rotary, *axis).len() as f64 * self.count_of_ranges(*axis)
+        });
+        let ways = if self.variations.follow { 2.0 } else { 1.0 };
+        let points = ball_count(self.session, &self.with_the_axis(), &rotary, true);
+        points * (1.0 + approaches * turns.sum::<f64>() * ways)
+    }
+
+    fn rotary(&self) -> Vec<usize> {
+        let machine = self.machine();
+        (0..machine.axes.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary).collect()
+    }
+
+    /// The variations with points on the axis too.
+    fn with_the_axis(&self) -> TestVariations {
+        let radii_mm = std::iter::once(0.0).chain(self.variations.radii_mm.iter().copied()).collect();
+        TestVariations { radii_mm, ..self.variations.clone() }
     }
 
     /// One axis moves, the others stand.
@@ -195,17 +228,12 @@ impl Template<'_> {
     /// Two points stay in contact: linear axes follow a rotary one, a rotary axis turns about the point on it, the tool goes
     /// round an artefact. `None` for an instrument without contact.
     fn contacts(&self) -> Option<Contacts<'_>> {
-        let machine = self.machine();
         let approaches = self.station.approaches();
         if approaches.is_empty() {
             return None;
         }
-        let rotary: Vec<usize> =
-            (0..machine.axes.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary).collect();
-        // On the axis too.
-        let radii_mm = std::iter::once(0.0).chain(self.variations.radii_mm.iter().copied()).collect();
-        let wider = TestVariations { radii_mm, ..self.variations.clone() };
-        let points = ball_positions(self.session, self.station.kind(), &wider, &rotary, true);
+        let rotary = self.rotary();
+        let points = ball_positions(self.session, self.station.kind(), &self.with_the_axis(), &rotary, true);
         let of_axis = |axis: &usize| {
             let positions = axis_positions(self.session, self.variations, &rotary, *axis).into_iter();
             positions.flat_map(|at| self.ranges(*axis).map(move |range| (*axis, at.clone(), range))).collect::<Vec<_>>()
@@ -356,12 +384,6 @@ struct Contacts<'t> {
 }
 
 impl Contacts<'_> {
-    /// The largest possible number of candidates.
-    fn count(&self) -> usize {
-        let ways = if self.template.variations.follow { 2 } else { 1 };
-        self.points.len() * (1 + self.approaches.len() * self.turns.len() * ways)
-    }
-
     fn drafts(&self) -> Vec<Draft> {
         let template = self.template;
         let mut drafts = Vec::new();
@@ -463,7 +485,42 @@ fn nice(step: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::nice;
+    use std::path::Path;
+
+    use abbe_files::ReadOptions;
+    use abbe_model::instrument::InstrumentKind;
+
+    use super::*;
+
+    /// Candidates are counted before their places are: 10¹⁰ of these would fill the memory.
+    #[test]
+    fn more_candidates_than_the_limit_are_refused_at_once() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/r-test/plan.toml");
+        let session = abbe_files::session(&file, &ReadOptions { read_data: false, ..ReadOptions::default() }).unwrap();
+        let many: Vec<f64> = (1..=100_000).map(f64::from).collect();
+        let variations = TestVariations { radii_mm: many.clone(), heights_mm: many, ..TestVariations::default() };
+        let found = drafts(&session, &variations, InstrumentKind::RTest);
+        assert!(
+            matches!(found, Err(PlanError::TooMany { limit: MAX_DRAFTS, .. })),
+            "{:?}",
+            found.map(|drafts| drafts.len())
+        );
+    }
+
+    /// No draft is left out of the count.
+    #[test]
+    fn the_count_is_no_less_than_the_candidates() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/r-test/plan.toml");
+        let session = abbe_files::session(&file, &ReadOptions { read_data: false, ..ReadOptions::default() }).unwrap();
+        let variations = TestVariations { feeds: vec![1.0, 0.5], ranges: vec![1.0, 0.5], ..TestVariations::default() };
+        let station = start::stations(&session, &session.tests).pop().unwrap();
+        let test = session.tests.last().unwrap();
+        let template = Template { session: &session, variations: &variations, test, station: &station };
+        let made = template.contacts().unwrap().drafts().len() as f64;
+        let count = template.count_in_contact();
+        println!("{made} of {count}");
+        assert!(made <= count && count < 3.0 * made, "{made} of {count}");
+    }
 
     #[test]
     fn steps_are_round() {
