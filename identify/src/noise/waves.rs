@@ -78,7 +78,6 @@ impl PureError {
 
     /// The most significant band of runs, in half cycles, if any is significant.
     fn band(&self, runs: &[RunRows], autocorrelation: &Autocorrelation) -> Option<Range<usize>> {
-        let shortest = runs.iter().map(|run| run.rows.len()).min()?;
         let whitened: Vec<Vec<f64>> = runs
             .iter()
             .map(|RunRows { test, rows }| {
@@ -90,34 +89,43 @@ impl PureError {
                 rows.clone().map(|row| deviation(row) - past(row)).collect()
             })
             .collect();
-        let first = *FIRST.start();
-        let sums: Vec<f64> = (first..HIGHEST.min(shortest))
-            .map(|half_cycles| whitened.iter().map(|run| ordinate(run, half_cycles)).sum())
-            .collect();
         // Repeats hold the same deviation more than once: this is the number of independent runs.
         let deviations_count = self.deviations.iter().flatten().flatten().count().max(1);
         let independent = runs.len() as f64 * self.freedom as f64 / deviations_count as f64;
-        // Median of a gamma distribution (Wilson and Hilferty).
-        let median_of_gamma = independent * (1.0 - 1.0 / (9.0 * independent)).powi(3);
-        let level = median(&mut sums.clone()) / median_of_gamma;
-        if level <= 0.0 {
-            return None;
-        }
         let candidates = (FIRST.count() * WIDTHS.len()) as f64;
-        WIDTHS
+        bands(&whitened, independent)
             .into_iter()
-            .flat_map(|width| sums.windows(width).take(FIRST.count()).enumerate())
-            .map(|(begin, band)| {
-                // Of ordinates half a cycle apart, every second one is independent.
-                let cycles = (0.5 * band.len() as f64).max(1.0);
-                let mean = band.iter().sum::<f64>() / (band.len() as f64 * level);
-                let p_value = gamma_ur(independent * cycles, mean * cycles);
-                (first + begin..first + begin + band.len(), p_value)
-            })
             .min_by(|a, b| a.1.total_cmp(&b.1))
             .filter(|(_, p_value)| *p_value < BAND_SIGNIFICANCE / candidates)
             .map(|(band, _)| band)
     }
+}
+
+/// The candidate bands of whitened runs, so many of which are independent: half cycles along a run, and the p-value. In white
+/// noise a sum of ordinates over `r` runs has a gamma distribution of shape `r`; its scale follows from the median of all.
+fn bands(whitened: &[Vec<f64>], independent: f64) -> Vec<(Range<usize>, f64)> {
+    let shortest = whitened.iter().map(Vec::len).min().unwrap_or(0);
+    let first = *FIRST.start();
+    let sums: Vec<f64> = (first..HIGHEST.min(shortest))
+        .map(|half_cycles| whitened.iter().map(|run| ordinate(run, half_cycles)).sum())
+        .collect();
+    // Median of a gamma distribution (Wilson and Hilferty).
+    let median_of_gamma = independent * (1.0 - 1.0 / (9.0 * independent)).powi(3);
+    let level = median(&mut sums.clone()) / median_of_gamma;
+    if sums.is_empty() || level <= 0.0 {
+        return Vec::new();
+    }
+    let widths = WIDTHS.into_iter();
+    widths
+        .flat_map(|width| sums.windows(width).take(FIRST.count()).enumerate())
+        .map(|(begin, band)| {
+            // Of ordinates half a cycle apart, every second one is independent.
+            let cycles = (0.5 * band.len() as f64).max(1.0);
+            let mean = band.iter().sum::<f64>() / (band.len() as f64 * level);
+            let p_value = gamma_ur(independent * cycles, mean * cycles);
+            (first + begin..first + begin + band.len(), p_value)
+        })
+        .collect()
 }
 
 /// Values for which sine and cosine are computed once per ordinate.
@@ -172,7 +180,48 @@ fn remove_wave(run: &mut [Option<f64>], half_cycles: usize) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_pcg::Pcg64;
+
     use super::*;
+
+    /// In white noise the p-value of a band of one ordinate is uniform; those of wide bands are small a little less often,
+    /// since more than every second ordinate counts. A wave along all runs makes the bands that hold it significant, and no
+    /// band far from it.
+    #[test]
+    fn bands_of_white_noise_have_uniform_p_values() {
+        const DRAWS: usize = 400;
+        const RUNS: usize = 5;
+        let mut random = Pcg64::new(7, 11);
+        let mut white = || -> Vec<Vec<f64>> {
+            (0..RUNS).map(|_| (0..240).map(|_| StandardNormal.sample(&mut random)).collect()).collect()
+        };
+        let drawn: Vec<Vec<(Range<usize>, f64)>> = (0..DRAWS).map(|_| bands(&white(), RUNS as f64)).collect();
+        assert_eq!(drawn[0].len(), FIRST.count() * WIDTHS.len());
+        for width in WIDTHS {
+            for level in [0.05, 0.2, 0.5] {
+                // Bands 8 half cycles apart are nearly independent.
+                let own = drawn.iter().flatten().filter(|(band, _)| band.len() == width && band.start % 8 == 2);
+                let p_values: Vec<f64> = own.map(|(_, p_value)| *p_value).collect();
+                let share = p_values.iter().filter(|p_value| **p_value < level).count() as f64 / p_values.len() as f64;
+                println!("{width}, {level}: {share}");
+                let sampling = (level * (1.0 - level) / p_values.len() as f64).sqrt();
+                let least = if width == 1 { level } else { 0.6 * level };
+                assert!(share < level + 4.0 * sampling && share > least - 4.0 * sampling, "{width}: {share}, {level}");
+            }
+        }
+        let wave = |t: usize| 0.8 * (std::f64::consts::PI * 21.0 * t as f64 / 240.0).cos();
+        let with_wave: Vec<Vec<f64>> =
+            white().iter().map(|run| run.iter().enumerate().map(|(t, v)| v + wave(t)).collect()).collect();
+        for (band, p_value) in bands(&with_wave, RUNS as f64) {
+            if band.contains(&21) {
+                assert!(p_value < 1e-6, "{band:?}: {p_value}");
+            } else if band.start > 24 || band.end < 19 {
+                assert!(p_value > 1e-6, "{band:?}: {p_value}");
+            }
+        }
+        assert!(bands(&[vec![0.0; 100]], 1.0).is_empty() && bands(&[], 1.0).is_empty());
+    }
 
     /// The ordinate of a wave of amplitude `a` over `n` values is `a² n/4`, and that of another whole number of cycles is
     /// zero; the length is no multiple of a block.
