@@ -12,6 +12,8 @@ use std::sync::Arc;
 
 use abbe_identify::error::IdentifyError;
 use abbe_identify::numerics::parallel;
+use abbe_model::driver::Driver;
+use abbe_model::effect::Component;
 use faer::Mat;
 
 use super::{ALL, SearchBranch, SearchState, SelectedEffect};
@@ -57,6 +59,24 @@ struct HeldOutResiduals {
 struct Prediction {
     of_model: Vec<f64>,
     of_candidates: Vec<(usize, Vec<f64>)>,
+}
+
+/// All that the averaged prediction of a branch depends on.
+#[derive(Clone, PartialEq)]
+struct AveragedOver {
+    chosen: Vec<usize>,
+    /// The number of candidates that the branch may add. They are appended in one order, so that it tells them.
+    addable: usize,
+    last_resort: bool,
+    passed_over: Vec<(Component, Driver)>,
+}
+
+/// The last averaged prediction of a branch. Most rounds leave most branches as they were, and averages cost as much as
+/// the search for candidates.
+#[derive(Clone)]
+pub(super) struct Averaged {
+    over: AveragedOver,
+    prediction: Arc<Prediction>,
 }
 
 /// An explanation of the readings of the training folds in place of an effect.
@@ -134,20 +154,21 @@ pub struct RejectedByHeldOut {
 
 impl SearchState<'_> {
     /// The residuals of the selected effects.
-    fn residuals(&self) -> Result<HeldOutResiduals, IdentifyError> {
+    fn residuals(&mut self) -> Result<HeldOutResiduals, IdentifyError> {
         let branches = &self.selection.branches;
         let of_all = self.prediction_of(&branches[ALL].chosen(), &branches[ALL].folds)?;
         let by_fold = parallel::map(branches.len() - 1, &|fold| {
-            let branch = &branches[ALL + 1 + fold];
-            let predicted = self.averaged_prediction(branch)?;
-            self.forget_unselected(ALL + 1 + fold);
-            Ok((self.residuals_of_fold(fold, &predicted), self.residuals_of_fold(fold, &of_all)))
+            let averaged = self.averaged(ALL + 1 + fold)?;
+            let residuals = [&averaged.prediction, &of_all].map(|predicted| self.residuals_of_fold(fold, predicted));
+            Ok((residuals, averaged))
         });
-        let by_fold: Vec<(Vec<f64>, Vec<f64>)> = by_fold.into_iter().collect::<Result<_, IdentifyError>>()?;
+        let by_fold: Vec<([Vec<f64>; 2], Averaged)> = by_fold.into_iter().collect::<Result<_, IdentifyError>>()?;
+        let (by_fold, averaged): (Vec<[Vec<f64>; 2]>, Vec<Averaged>) = by_fold.into_iter().unzip();
+        self.averaged = averaged;
         let mut next = vec![0; by_fold.len()];
         let mut residuals = HeldOutResiduals::default();
         for fold in &self.unwhitened.folds {
-            let (held_out, of_all) = &by_fold[*fold];
+            let [held_out, of_all] = &by_fold[*fold];
             residuals.held_out.push(held_out[next[*fold]]);
             residuals.of_all.push(of_all[next[*fold]]);
             next[*fold] += 1;
@@ -165,6 +186,24 @@ impl SearchState<'_> {
     /// Candidates with their numbers of columns.
     fn with_counts(&self, candidates: &[usize]) -> impl Iterator<Item = (usize, usize)> {
         candidates.iter().map(|candidate| (*candidate, self.gram.count(*candidate)))
+    }
+
+    /// The averaged prediction of a branch: the last one, if nothing has changed since.
+    fn averaged(&self, branch: usize) -> Result<Averaged, IdentifyError> {
+        let own = &self.selection.branches[branch];
+        let addable = (0..self.candidates.len()).filter(|candidate| self.may_be_added(*candidate, &own.folds)).count();
+        let over = AveragedOver {
+            chosen: own.chosen(),
+            addable,
+            last_resort: self.last_resort,
+            passed_over: self.passed_over.clone(),
+        };
+        if let Some(last) = self.averaged.get(branch - ALL - 1).filter(|last| last.over == over) {
+            return Ok(last.clone());
+        }
+        let prediction = Arc::new(self.averaged_prediction(own)?);
+        self.forget_unselected(branch);
+        Ok(Averaged { over, prediction })
     }
 
     /// The prediction of a branch. For each effect it is averaged over the candidates that explain about as much in its
@@ -257,7 +296,7 @@ impl SearchState<'_> {
     }
 
     /// Sum of squares of held-out residuals over the noise variance.
-    pub fn held_out_now(&self) -> Result<f64, IdentifyError> {
+    pub fn held_out_now(&mut self) -> Result<f64, IdentifyError> {
         Ok(self.residuals()?.held_out.iter().map(|r| r * r).sum())
     }
 

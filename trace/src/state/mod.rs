@@ -22,6 +22,7 @@ use super::policy::Policy;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::columns::Columns;
 use crate::candidates::gram::Gram;
+use heldout::Averaged;
 pub use heldout::{RejectedByHeldOut, Selection, UnwhitenedModel};
 
 /// An effect that a search has selected.
@@ -76,6 +77,8 @@ pub struct SearchState<'s> {
     pub last_resort: bool,
     /// The unwhitened model and residual for the held-out error.
     unwhitened: Arc<UnwhitenedModel>,
+    /// The last prediction of each fold, in their order.
+    averaged: Vec<Averaged>,
     /// Components and drivers that were tried in this round.
     pub passed_over: Vec<(Component, Driver)>,
     /// Effects that scored better than readings without structure but were not accepted, in order of addition.
@@ -114,6 +117,7 @@ impl<'s> SearchState<'s> {
             thresholds: Vec::new(),
             last_resort: false,
             unwhitened: Arc::new(unwhitened),
+            averaged: Vec::new(),
             passed_over: Vec::new(),
             rejected: Vec::new(),
             detectable_effects: 0,
