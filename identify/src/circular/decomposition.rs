@@ -167,3 +167,20 @@ impl Decomposition {
         found.into_iter().map(by_direction).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// With two degrees of freedom `P(χ² ≥ x) = exp(−x/2)`: the gain at which `n` candidates are significant is
+    /// `2 s² ln(1000 n)`.
+    #[test]
+    fn the_limit_of_a_gain_rises_with_the_candidates() {
+        for (variance, candidates) in [(1.0, 1), (4e-8, 12), (2.5e-7, 640)] {
+            let limit = 2.0 * variance * (1000.0 * candidates as f64).ln();
+            assert!(is_significant(limit * (1.0 + 1e-9), variance, 2, candidates), "{candidates}");
+            assert!(!is_significant(limit * (1.0 - 1e-9), variance, 2, candidates), "{candidates}");
+        }
+        assert!(!is_significant(1.0, 0.0, 2, 1), "no residual, no significance");
+    }
+}
