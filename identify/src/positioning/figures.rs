@@ -116,8 +116,12 @@ struct Value {
 }
 
 impl Value {
-    fn plus(self, other: Value, factor: f64) -> Value {
-        Value { value: self.value + factor * other.value, share: self.share + factor * factor * other.share }
+    fn plus(self, other: Value) -> Value {
+        Value { value: self.value + other.value, share: self.share + other.share }
+    }
+
+    fn minus(self, other: Value) -> Value {
+        self.plus(other.times(-1.0))
     }
 
     fn times(self, factor: f64) -> Value {
@@ -135,18 +139,18 @@ impl Value {
 
 impl Position {
     fn reversal(&self) -> Option<Value> {
-        Some(self.forward?.with(0.0)?.plus(self.backward?.with(0.0)?, -1.0))
+        Some(self.forward?.with(0.0)?.minus(self.backward?.with(0.0)?))
     }
 
     fn mean(&self) -> Option<Value> {
-        Some(self.forward?.with(0.0)?.plus(self.backward?.with(0.0)?, 1.0).times(0.5))
+        Some(self.forward?.with(0.0)?.plus(self.backward?.with(0.0)?).times(0.5))
     }
 
     fn repeatability(&self) -> Option<Value> {
         let (forward, backward) = (self.forward?, self.backward?);
         let reversal = self.reversal()?;
         let reversal = reversal.times(if reversal.value < 0.0 { -1.0 } else { 1.0 });
-        let both = forward.spread(2.0)?.plus(backward.spread(2.0)?, 1.0).plus(reversal, 1.0);
+        let both = forward.spread(2.0)?.plus(backward.spread(2.0)?).plus(reversal);
         Some(both.largest(forward.spread(4.0)?).largest(backward.spread(4.0)?))
     }
 }
@@ -158,7 +162,7 @@ pub(super) fn figures(positions: &[Position]) -> [Figures; 2] {
     let all = |of: Of<'_>| positions.iter().map(of).collect::<Option<Vec<Value>>>().filter(|all| !all.is_empty());
     let greatest = |of: Of<'_>| all(of)?.into_iter().reduce(Value::largest);
     let least = |of: Of<'_>| all(of)?.into_iter().reduce(Value::smallest);
-    let range = |high: Of<'_>, low: Of<'_>| Some(greatest(high)?.plus(least(low)?, -1.0));
+    let range = |high: Of<'_>, low: Of<'_>| Some(greatest(high)?.minus(least(low)?));
     let forward = |deviations: f64| move |p: &Position| p.forward?.with(deviations);
     let backward = |deviations: f64| move |p: &Position| p.backward?.with(deviations);
     let larger =
@@ -169,7 +173,7 @@ pub(super) fn figures(positions: &[Position]) -> [Figures; 2] {
     let size = |p: &Position| p.reversal().map(|reversal| reversal.times(reversal.value.signum()));
     let mean_reversal = all(&Position::reversal).and_then(|all| {
         let share = 1.0 / all.len() as f64;
-        Some(all.into_iter().reduce(|sum, one| sum.plus(one, 1.0))?.times(share))
+        Some(all.into_iter().reduce(|sum, one| sum.plus(one))?.times(share))
     });
     let found = [
         range(&forward(2.0), &forward(-2.0)),
