@@ -198,10 +198,11 @@ impl SearchState<'_> {
             last_resort: self.last_resort,
             passed_over: self.passed_over.clone(),
         };
-        if let Some(last) = self.averaged.get(branch - ALL - 1).filter(|last| last.over == over) {
-            return Ok(last.clone());
-        }
-        let prediction = Arc::new(self.averaged_prediction(own)?);
+        let last = self.averaged.get(branch - ALL - 1).filter(|last| last.over == over);
+        let prediction = match last {
+            Some(last) => Arc::clone(&last.prediction),
+            None => Arc::new(self.averaged_prediction(own)?),
+        };
         self.forget_unselected(branch);
         Ok(Averaged { over, prediction })
     }
