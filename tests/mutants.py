@@ -178,9 +178,9 @@ def run_tests(program, folder, names, limit, **environment):
         return 2, ""
 
 
-def examples_fail(copy, package, number):
-    """Whether an example of the documentation fails."""
-    command = ["cargo", "test", "--doc", "-p", package, *PROFILE]
+def examples_fail(copy, number):
+    """Whether an example of the documentation fails. Those of one package alone would be built with other features of all dependencies."""
+    command = ["cargo", "test", "--doc", "--workspace", *PROFILE]
     run = subprocess.run(command, cwd=copy, env=dict(os.environ, ABBE_MUTANT=str(number)), capture_output=True)
     return run.returncode != 0
 
@@ -299,7 +299,7 @@ def main():
                 begin = time.time()
                 others, kept_answers = [stages_of(tests, folders[mutant["package"]], mutant["number"], of_kept) for of_kept in (False, True)]
                 verdict, by = first_failing(others, mutant)
-                if verdict == "missed" and examples_fail(copy, mutant["package"], mutant["number"]):
+                if verdict == "missed" and examples_fail(copy, mutant["number"]):
                     verdict, by = "caught", "an example of the documentation"
                 kept_only = verdict == "missed"
                 if kept_only:
