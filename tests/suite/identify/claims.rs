@@ -90,7 +90,7 @@ fn a_warm_up_in_one_run_is_an_effect_and_no_slow_noise() {
 /// without an effect. No more of the sessions have a claim, within four standard errors of their number.
 #[test]
 fn noise_beyond_the_null_distribution_fails_the_held_out_rule() {
-    const SESSIONS: u64 = 16;
+    const SESSIONS: u64 = 24;
     const PASSING: f64 = 0.159;
     let (mut claimed, mut rejected) = (0, 0);
     for seed in 1..=SESSIONS {

@@ -126,11 +126,11 @@ fn three_reflectors_give_the_noise_and_judge_the_model() {
     assert!((88..=100).contains(&inside) && agree >= 98 && exceed == 10, "{inside} {agree} {exceed}");
 }
 
-/// One reflector leaves the noise open, so nothing is explained. Three make a verdict: over 10 sets each, without an effect
+/// One reflector leaves the noise open, so nothing is explained. Three make a verdict: over 20 sets each, without an effect
 /// and with an eccentricity. The search on poses claims an effect without one in about 5 % of sets, and structure in 1 to 3 %.
 #[test]
 fn a_trace_is_judged_by_the_noise_of_three_reflectors() {
-    const SETS: u64 = 10;
+    const SETS: u64 = 20;
     let traced = |seed: u64, targets: &[[f64; 3]], eccentric: f64| {
         let result = trace(&session(seed, targets, eccentric), &TraceOptions::default(), &|_| true).unwrap().result;
         let name = |effect: &EffectResult| {
@@ -151,7 +151,7 @@ fn a_trace_is_judged_by_the_noise_of_three_reflectors() {
         explained += u64::from(verdict == TraceVerdict::Explained && is_named);
     }
     println!("of {SETS} sets: {clean} clean without an effect, {explained} explained with an eccentricity");
-    assert!(clean >= 7 && explained >= 8, "{clean} {explained}");
+    assert!(clean >= 14 && explained >= 17, "{clean} {explained}");
     let (verdict, _, source) = traced(3, &TARGETS[..1], 0.0);
     assert_eq!((verdict, source), (TraceVerdict::NotJudged, NoiseSource::Residual));
 }
