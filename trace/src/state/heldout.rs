@@ -65,14 +65,14 @@ struct Prediction {
 #[derive(Clone, PartialEq)]
 struct AveragedOver {
     chosen: Vec<usize>,
-    /// The number of candidates that the branch may add. They are appended in one order, so that it tells them.
+    /// The number of candidates that the branch may add. Candidates are only appended, so that their number tells which.
     addable: usize,
     last_resort: bool,
     passed_over: Vec<(Component, Driver)>,
 }
 
-/// The last averaged prediction of a branch. Most rounds leave most branches as they were, and averages cost as much as
-/// the search for candidates.
+/// The last averaged prediction of a branch. An average needs the gain of every candidate on the branch, once for each of
+/// its effects, and many rounds leave a branch as it was.
 #[derive(Clone)]
 pub(super) struct Averaged {
     over: AveragedOver,
