@@ -39,7 +39,7 @@ fn nominal(session: &Session, test: &Test, readings: &Readings) -> Vec<f64> {
 fn one_test(test: &str) -> Result<Session, abbe_model::ModelError> {
     let folder = tempfile::tempdir().unwrap();
     let text = format!(
-        "[machine]\nchain = \"w C A b Y X Z t\"\n[machine.axis.C]\n[machine.axis.A]\n[machine.axis.X]\n\
+        "[machine]\nchain = \"w C A b Y X Z t\"\n[machine.axis.C]\n[machine.axis.A]\ntravel_deg = [-120, 120]\n[machine.axis.X]\n\
          travel_mm = [-200, 200]\n[machine.axis.Y]\n[machine.axis.Z]\n\n[instrument]\nkind = \"ballbar\"\n\n[[test]]\n\
          name = \"T\"\nspindle_ball_mm = [0, 0, 0]\n{test}\n"
     );
@@ -151,6 +151,11 @@ fn a_plan_beyond_the_travel_is_refused() {
                 path = { kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 1 }";
     let message = one_test(test).unwrap_err().to_string();
     assert!(message.contains("axis `X` goes to 250.000 mm; its travel is -200 to 200 mm"), "{message}");
+    // 120° is no round number of radians.
+    let test = "bar_mm = 100\nworkpiece_ball_mm = [0, 0, 100]\n\
+                sweep = { axis = \"A\", from_deg = 0, to_deg = 150, step_deg = 10 }";
+    let message = one_test(test).unwrap_err().to_string();
+    assert!(message.contains("axis `A` goes to 130.000 deg; its travel is -120 to 120 deg"), "{message}");
 }
 
 #[test]

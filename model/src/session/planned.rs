@@ -6,6 +6,7 @@ use super::{Session, Test, trajectory};
 use crate::chain::Machine;
 use crate::error::ModelError;
 use crate::instrument::{Checked, Station};
+use crate::words::number;
 
 /// Pause between the tests of a planned session, s.
 const BETWEEN_TESTS_S: f64 = 120.0;
@@ -97,8 +98,8 @@ pub fn beyond_travel(machine: &Machine, readings: &Readings) -> Option<String> {
             "axis `{}` goes to {:.3} {unit}; its travel is {} to {} {unit}",
             axis.name,
             displayed(*beyond),
-            displayed(least),
-            displayed(greatest),
+            number(displayed(least)),
+            number(displayed(greatest)),
             unit = axis.kind.unit(),
         ))
     })
