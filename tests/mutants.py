@@ -293,6 +293,8 @@ def main():
         tested_by = {package: TESTED_BY[package][:1] if given.own else TESTED_BY[package] for package in packages}
         folders = {package: [str((copy / folder).resolve()) for folder in tested_by[package]] for package in packages}
         print(f"{len(tests)} tests of {sum(test.seconds for test in tests):.0f} s", flush=True)
+        reached = frozenset().union(*(test.reached for test in tests))
+        print(*(f"reached by no test: {m['name']}" for m in kept if m["number"] not in reached), sep="\n", flush=True)
         tried = {json.loads(line)["name"] for line in given.out.read_text().splitlines()} if given.out.exists() else set()
         with given.out.open("a") as out:
             for mutant in (m for m in kept if m["name"] not in tried):
