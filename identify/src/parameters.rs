@@ -308,6 +308,45 @@ impl Parameters {
         self.effects.iter().any(|effect| !effect.estimated.is_empty())
     }
 
+    /// The positions of shapes that a fit estimates: the effect and the place among its positions.
+    pub(crate) fn positions(&self) -> impl Iterator<Item = (usize, usize)> {
+        let estimated = self.effects.iter().enumerate().filter(|(_, effect)| effect.positions_estimated);
+        estimated.flat_map(|(number, effect)| (0..effect.shape.positions().len()).map(move |step| (number, step)))
+    }
+
+    /// The identifier of a position in results: `EXX~X:steps.at2`.
+    pub(crate) fn position_id(&self, effect: usize, step: usize) -> String {
+        let several = self.effects[effect].shape.positions().len() > 1;
+        let number = if several { (step + 1).to_string() } else { String::new() };
+        format!("{}.at{number}", self.effect_ids[effect])
+    }
+
+    /// Whether an identifier of a result is that of an estimated position.
+    pub(crate) fn is_position(&self, id: &str) -> bool {
+        self.positions().any(|(effect, step)| self.position_id(effect, step) == id)
+    }
+
+    /// The values of the driver of an effect at the readings of the tests in which it acts, ascending, each once.
+    ///
+    /// # Errors
+    /// If the data lack the column of the driver.
+    pub(crate) fn levels(
+        session: &Session,
+        tests: &[Test],
+        models: &[TestModel],
+        reference: &Reference,
+        effect: &Effect,
+    ) -> Result<Vec<f64>, IdentifyError> {
+        let mut levels = Vec::new();
+        for (test, model) in tests.iter().zip(models) {
+            levels
+                .extend(BasisOverTest::of(session, test, model, reference, effect)?.into_iter().flat_map(|b| b.driver));
+        }
+        levels.sort_by(f64::total_cmp);
+        levels.dedup();
+        Ok(levels)
+    }
+
     /// The value of a parameter at the parameters `beta`, internal units: a number of a shape is stated itself, not as its
     /// change.
     pub fn value(&self, parameter: usize, beta: &[f64]) -> f64 {
@@ -318,7 +357,7 @@ impl Parameters {
     }
 
     /// Adds the changes of estimated numbers in `beta` to the shapes, sets them to zero, and linearises the model in these
-    /// numbers at the coefficients in `beta`:
+    /// numbers at the coefficients in `beta`, with the positions that the shapes have now:
     ///
     /// ```text
     /// ∂component/∂n = Σ_k c_k · ∂b_k(driver; n)/∂n
@@ -335,7 +374,7 @@ impl Parameters {
         beta: &mut [f64],
     ) -> Result<(), IdentifyError> {
         for index in 0..self.effects.len() {
-            if self.effects[index].estimated.is_empty() {
+            if self.effects[index].estimated.is_empty() && !self.effects[index].positions_estimated {
                 continue;
             }
             let own = |role: Role| match role {

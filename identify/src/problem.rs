@@ -157,12 +157,20 @@ impl Problem {
     /// # Errors
     /// If the data lack the column of a driver.
     pub fn linearise_numbers(&mut self, beta: &mut [f64]) -> Result<(), IdentifyError> {
-        if self.parameters.has_numbers() {
+        if self.parameters.has_numbers() || self.parameters.positions().next().is_some() {
             let (tests, models) = (&self.tests, &self.models);
             self.parameters.linearise_numbers(&self.session, tests, models, &self.reference, beta)?;
             self.update_test_parameters();
         }
         Ok(())
+    }
+
+    /// The values of the driver of an effect at the readings, ascending, each once, internal unit of the driver.
+    ///
+    /// # Errors
+    /// If the data lack the column of the driver.
+    pub(crate) fn levels(&self, effect: &Effect) -> Result<Vec<f64>, IdentifyError> {
+        Parameters::levels(&self.session, &self.tests, &self.models, &self.reference, effect)
     }
 
     /// Limits the changes of estimated numbers to what their shapes permit and to a factor of [`MAX_FACTOR_OF_NUMBER`].

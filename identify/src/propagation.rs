@@ -21,7 +21,7 @@ use crate::fit::Fit;
 use crate::monte_carlo::{self, Distribution, Draws, MonteCarlo};
 use crate::numerics::tails::normal_quantile;
 use crate::problem::Problem;
-use crate::results::{DrawnParameter, FitMonteCarlo, FitResult, Verdict, phases_follow_amplitudes};
+use crate::results::{DrawnParameter, FitMonteCarlo, FitResult, ParameterResult, Verdict, phases_follow_amplitudes};
 use crate::tolerance::conformity;
 use refit::Refit;
 
@@ -54,15 +54,20 @@ pub fn add_monte_carlo(
              Monte Carlo",
         ));
     }
-    let parameters: Vec<DrawnParameter> = result
-        .parameters
+    // The draws are those of the noise. What uncertainties cover beside it, aliases and positions of steps, is added.
+    let of_noise = fit::parameters_of_noise(problem, fit);
+    let is_drawn = |parameter: &ParameterResult| !problem.parameters.is_position(&parameter.id);
+    let parameters: Vec<DrawnParameter> = of_noise
         .iter()
+        .filter(|parameter| is_drawn(parameter))
         .zip(&distributions)
         .map(|(parameter, drawn)| compared(&parameter.id, parameter.value, parameter.u, &parameter.unit, drawn, draws))
         .collect();
-    for (parameter, drawn) in result.parameters.iter_mut().zip(&parameters) {
+    let reported = result.parameters.iter_mut().zip(&of_noise).filter(|(parameter, _)| is_drawn(parameter));
+    for ((parameter, of_noise), drawn) in reported.zip(&parameters) {
         if drawn.verdict != Verdict::Agree {
-            parameter.set_u(drawn.u);
+            let beside = (parameter.u * parameter.u - of_noise.u * of_noise.u).max(0.0).sqrt();
+            parameter.set_u(drawn.u.hypot(beside));
         }
     }
     phases_follow_amplitudes(&mut result.parameters);

@@ -255,7 +255,8 @@ fn further(problem: &Problem, parameters: &[ParameterResult]) -> Vec<ParameterRe
         });
         let effect = ids.max_by_key(|(_, id)| id.len()).map(|(number, _)| number);
         let same = problem.parameters.list.iter().find(|parameter| parameter.id == found.id);
-        if same.is_some_and(|parameter| matches!(parameter.role, Role::Number { .. })) {
+        let is_number = same.is_some_and(|parameter| matches!(parameter.role, Role::Number { .. }));
+        if is_number || problem.parameters.is_position(&found.id) {
             continue;
         }
         let is_setup = same.is_some_and(|parameter| parameter.role == Role::Setup);

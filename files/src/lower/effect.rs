@@ -45,18 +45,22 @@ pub(super) fn effect(
     let aliases = aliases.collect::<Result<_, _>>().within("alias")?;
     let assumed = document.assumed.unwrap_or_default();
     let effect = one(context, declared, columns, document)?;
-    let estimated = estimated(&effect.shape, document.estimate.as_deref().unwrap_or_default()).within("estimate")?;
-    Ok(Effect { aliases, assumed, estimated, ..effect })
+    let names = document.estimate.as_deref().unwrap_or_default();
+    let mut estimated = estimated(&effect.shape, names).within("estimate")?;
+    let numbers = effect.shape.number_names().len();
+    let positions_estimated = estimated.pop_if(|which| *which >= numbers).is_some();
+    Ok(Effect { aliases, assumed, estimated, positions_estimated, ..effect })
 }
 
-/// The numbers of a shape that a fit estimates, by index, ascending.
+/// The numbers of a shape that a fit estimates, by index, ascending. Positions come after the numbers.
 fn estimated(shape: &Shape, names: &[String]) -> Result<Vec<usize>, Fault> {
-    let known = shape.number_names();
+    let positions = (!shape.positions().is_empty()).then_some(document::POSITIONS);
+    let known: Vec<&str> = shape.number_names().iter().copied().chain(positions).collect();
     let mut estimated = Vec::with_capacity(names.len());
     for (item, name) in names.iter().enumerate() {
         let Some(which) = known.iter().position(|known| known == name) else {
             let message = format!("\"{name}\" is not a number of the shape \"{}\" that can be estimated", shape.word());
-            let help: Help = match known {
+            let help: Help = match known.as_slice() {
                 [] => "remove `estimate`: all of its coefficients are estimated anyway".into(),
                 known => known_names(name, known).into(),
             };

@@ -8,30 +8,16 @@
 //! ```
 //!
 //! `δ` is the change of the parameters. The coefficients of the effect itself have none: the alias does not have them.
-//! An uncertainty covers, for each effect, the largest change by one of its aliases:
-//!
-//! ```text
-//! u² = u₀² + Σ_effects max_aliases δ²
-//! ```
-//!
-//! The covariance has the changes of one alias correlated: `D·(Σ δδᵀ)·D` for each effect, with `D` such that the
-//! diagonal is the largest `δ²`.
 
 use std::ops::Range;
 
 use abbe_model::effect::Effect;
 use faer::Mat;
 
-use super::Fit;
-use super::quantities::{quantities, u_of_undetermined_phase_deg, values_at};
 use crate::error::IdentifyError;
 use crate::numerics::solve::Svd;
 use crate::parameters::Role;
 use crate::problem::Problem;
-use crate::results::{EnlargedBy, ParameterResult, phases_follow_amplitudes};
-
-/// Share of an uncertainty without aliases that a change needs to be listed.
-const LISTED: f64 = 0.05;
 
 /// An alias in the place of its effect.
 #[derive(Clone, Debug)]
@@ -119,101 +105,4 @@ pub fn at_solution(problem: &Problem, beta: &[f64]) -> Result<Vec<EffectAliases>
         found.push(EffectAliases { effect: number, aliases });
     }
     Ok(found)
-}
-
-/// The changes of some functions of the parameters by each alias, by effect. `values` gives the functions.
-fn shifts(fit: &Fit, values: impl Fn(&[f64]) -> Vec<f64>) -> Vec<Vec<Vec<f64>>> {
-    let present = values(&fit.beta);
-    let of_alias = |alias: &AliasChange| -> Vec<f64> {
-        let moved: Vec<f64> = fit.beta.iter().zip(&alias.changes).map(|(value, by)| value + by).collect();
-        values(&moved).iter().zip(&present).map(|(moved, present)| moved - present).collect()
-    };
-    fit.aliases.iter().map(|effect| effect.aliases.iter().map(of_alias).collect()).collect()
-}
-
-/// The largest change of each function by one alias of an effect, without its sign.
-fn largest(shifts: &[Vec<f64>], count: usize) -> Vec<f64> {
-    let most = |k: usize| shifts.iter().map(|of_alias| of_alias[k].abs()).fold(0.0, f64::max);
-    (0..count).map(most).collect()
-}
-
-/// By how much uncertainties of functions of the parameters exceed those without aliases, as a contribution of its own.
-pub fn contribution(fit: &Fit, count: usize, values: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
-    let mut squares = vec![0.0; count];
-    for of_effect in shifts(fit, values) {
-        squares.iter_mut().zip(largest(&of_effect, count)).for_each(|(sum, most)| *sum += most * most);
-    }
-    squares.into_iter().map(f64::sqrt).collect()
-}
-
-/// Adds the aliases to a covariance of functions of the parameters.
-pub(crate) fn add_to_covariance(covariance: &mut Mat<f64>, fit: &Fit, values: impl Fn(&[f64]) -> Vec<f64>) {
-    let count = covariance.nrows();
-    for of_effect in shifts(fit, values) {
-        let most = largest(&of_effect, count);
-        let scale: Vec<f64> = (0..count)
-            .map(|k| {
-                let sum: f64 = of_effect.iter().map(|of_alias| of_alias[k] * of_alias[k]).sum();
-                if sum > 0.0 { most[k] / sum.sqrt() } else { 0.0 }
-            })
-            .collect();
-        for of_alias in &of_effect {
-            let scaled: Vec<f64> = of_alias.iter().zip(&scale).map(|(shift, scale)| shift * scale).collect();
-            for i in 0..count {
-                for j in 0..count {
-                    covariance[(i, j)] += scaled[i] * scaled[j];
-                }
-            }
-        }
-    }
-}
-
-/// Enlarges the uncertainties of reported parameters to cover the aliases, and states which alias enlarges which.
-pub(super) fn cover(parameters: &mut [ParameterResult], problem: &Problem, fit: &Fit) {
-    if fit.aliases.is_empty() {
-        return;
-    }
-    let quantities = quantities(problem, &fit.rank);
-    let values = |beta: &[f64]| {
-        let mut values = Vec::with_capacity(parameters.len());
-        values_at(problem, fit, &quantities, beta, |value| values.push(value));
-        values
-    };
-    let by_effect = shifts(fit, values);
-    for (k, parameter) in parameters.iter_mut().enumerate() {
-        let without = parameter.u;
-        let mut variance = without * without;
-        for (of_effect, aliases) in by_effect.iter().zip(&fit.aliases) {
-            let most = of_effect.iter().enumerate().max_by(|a, b| a.1[k].abs().total_cmp(&b.1[k].abs()));
-            let Some((place, shift)) = most.map(|(place, of_alias)| (place, of_alias[k])) else { continue };
-            variance += shift * shift;
-            if shift.abs() > LISTED * without {
-                let effect = &problem.parameters.effects[aliases.effect];
-                let alias = effect.aliases.get(aliases.aliases[place].alias);
-                parameter.enlarged_by.push(EnlargedBy {
-                    effect: problem.parameters.effect_ids[aliases.effect].clone(),
-                    alias: alias.map(|alias| alias.id()).unwrap_or_default(),
-                    change: shift,
-                });
-            }
-        }
-        if !parameter.enlarged_by.is_empty() {
-            parameter.u_without_aliases = Some(without);
-        }
-        let mut u = variance.sqrt();
-        if parameter.id.ends_with(".phase") {
-            u = u.min(u_of_undetermined_phase_deg());
-        }
-        parameter.set_u(u);
-    }
-    phases_follow_amplitudes(parameters);
-}
-
-impl Fit {
-    /// Covariance of the parameters with everything that their uncertainties cover: noise, its enlargement, aliases.
-    pub fn covariance_with_aliases(&self) -> Mat<f64> {
-        let mut covariance = &self.covariance * faer::Scale(self.u_enlargement * self.u_enlargement);
-        add_to_covariance(&mut covariance, self, <[f64]>::to_vec);
-        covariance
-    }
 }

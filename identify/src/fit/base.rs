@@ -120,7 +120,7 @@ pub fn base_parameters(problem: &Problem, fit: &Fit, gauge: Gauge) -> Result<Bas
     held.sort_unstable();
     held.iter().for_each(|pivot| beta[*pivot] = 0.0);
     let prediction_change_mm = restore_predictions(problem, fit, &held, &mut beta)?;
-    let mut covariance = &transfer * fit.covariance_with_aliases() * transfer.transpose();
+    let mut covariance = &transfer * fit.whole_covariance() * transfer.transpose();
     for pivot in &held {
         for j in 0..list.len() {
             covariance[(j, *pivot)] = 0.0;

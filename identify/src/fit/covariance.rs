@@ -3,7 +3,7 @@
 use faer::Mat;
 
 use super::Fit;
-use super::aliases::add_to_covariance;
+use super::cover::add_to_covariance;
 use super::quantities::{Quantity, quantities, rms_of_waves, values_at};
 use crate::numerics::rank::Rank;
 use crate::problem::Problem;
@@ -15,7 +15,7 @@ pub fn of_parameters(problem: &Problem, fit: &Fit, parameters: &[ParameterResult
     let list = &problem.parameters.list;
     // Rows of the Jacobian of the reported quantities: their parameters, and the derivative by each.
     let mut rows: Vec<Vec<(usize, f64)>> = Vec::with_capacity(parameters.len());
-    for quantity in quantities(problem, &fit.rank) {
+    for quantity in quantities(problem, fit) {
         match quantity {
             Quantity::Parameter(j) => rows.push(vec![(j, list[j].unit.display_per_internal)]),
             Quantity::Rms(j, count) => {
@@ -31,6 +31,8 @@ pub fn of_parameters(problem: &Problem, fit: &Fit, parameters: &[ParameterResult
                 let per_radian = 1.0_f64.to_degrees() / amplitude;
                 rows.push(vec![(j, b / amplitude * per_radian), (j + 1, -a / amplitude * per_radian)]);
             }
+            // Its variance is that of the result.
+            Quantity::Position(_) => rows.push(Vec::new()),
         }
     }
     let enlargement = fit.u_enlargement * fit.u_enlargement;
@@ -39,7 +41,7 @@ pub fn of_parameters(problem: &Problem, fit: &Fit, parameters: &[ParameterResult
         products.sum::<f64>() * enlargement
     };
     let mut matrix = Mat::from_fn(rows.len(), rows.len(), |i, j| entry(&rows[i], &rows[j]));
-    let quantities = quantities(problem, &fit.rank);
+    let quantities = quantities(problem, fit);
     add_to_covariance(&mut matrix, fit, |beta| {
         let mut values = Vec::with_capacity(parameters.len());
         values_at(problem, fit, &quantities, beta, |value| values.push(value));

@@ -9,9 +9,11 @@ mod aliases;
 mod assume;
 pub mod base;
 mod covariance;
+mod cover;
 pub mod families;
 pub(crate) mod numbers;
 pub mod outcome;
+mod positions;
 mod prepare;
 mod quantities;
 mod reported;
@@ -31,14 +33,15 @@ use crate::numerics::tails::{chi_square_tail, residual_tail};
 use crate::numerics::triangle::Triangle;
 use crate::problem::Problem;
 
-pub use aliases::{
-    AliasChange, EffectAliases, at_solution as aliases_at_solution, contribution as contribution_of_aliases,
-};
+pub use aliases::{AliasChange, EffectAliases, at_solution as aliases_at_solution};
 pub use assume::{assume, statements as assumptions};
 pub use covariance::{null_space, of_parameters as covariance_of_parameters};
-pub use numbers::{NumberInterval, QUANTILE_95};
+pub use cover::contribution as contribution_beside_noise;
+pub use numbers::NumberInterval;
+pub use positions::StepPosition;
 pub use prepare::{NearMinimum, prepare, prepare_with, refit, with_families, with_families_linearised, with_lever};
 pub(crate) use quantities::{Quantity, quantities, values_at};
+pub(crate) use reported::parameters_of_noise;
 pub use reported::{ids, outliers, parameters, report, rms_of_units, unobservable};
 
 /// The result of a fit, in internal units.
@@ -71,6 +74,8 @@ pub struct Fit {
     pub aliases: Vec<EffectAliases>,
     /// The 95 % intervals of the numbers of shapes in which χ² is not parabolic.
     pub intervals: Vec<NumberInterval>,
+    /// The estimated positions of steps.
+    pub positions: Vec<StepPosition>,
 }
 
 /// Significance level of the χ² test of the residual against the noise.
@@ -206,6 +211,7 @@ fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, IdentifyError> {
         u_enlargement: 1.0,
         aliases,
         intervals: Vec::new(),
+        positions: Vec::new(),
     };
     if fit.exceeds_noise() {
         // The inflation of the likelihood enlarges the uncertainties already.
@@ -245,4 +251,35 @@ pub fn enlargement_warning(enlargement: f64) -> Option<String> {
             enlargement.powi(2)
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use abbe_files::ReadOptions;
+    use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+    use super::*;
+
+    /// A noise from repeats is known to as many degrees of freedom as its repeats have: readings of all runs but one for
+    /// each place, since a mean of each place is taken off, and a straight line of each run but one.
+    #[test]
+    fn a_noise_from_repeats_is_tested_by_f() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let mut session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
+        session.noise_mm = None;
+        let (mut problem, first) = prepare(&session, 1).unwrap();
+        assert_eq!(problem.noise.source, NoiseSource::Repeats);
+        // A residual beyond the noise by three hundredths.
+        problem.noise.sigma_mm *= first.birge_ratio / 1.03;
+        let fit = fit(&problem, None).unwrap();
+        let freedom = freedom_of_noise(&problem, &fit.residuals).unwrap();
+        assert!(freedom > 0 && freedom < problem.scalars(), "{freedom} of {}", problem.scalars());
+        let free = fit.degrees_of_freedom as f64;
+        let law = FisherSnedecor::new(free, freedom as f64).unwrap();
+        let wanted = law.sf(fit.chi_square / free);
+        assert!((fit.p_value - wanted).abs() <= 1e-9 * wanted, "{} and {wanted}", fit.p_value);
+        assert!(wanted > 1.2 * chi_square_tail(fit.chi_square, free) && wanted < 0.5, "{wanted}");
+    }
 }

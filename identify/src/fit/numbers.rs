@@ -19,13 +19,15 @@
 
 use abbe_model::session::Prior;
 
-use super::{Fit, fit, minimum};
+use super::{Fit, fit, minimum, positions};
 use crate::error::IdentifyError;
 use crate::parameters::Role;
 use crate::problem::Problem;
 
 /// Maximum number of linearisations.
 const MAX_ROUNDS: usize = 30;
+/// Maximum number of moves of steps.
+const MAX_MOVES: usize = 24;
 /// Shares of a step that are tried until χ² does not rise.
 const SHARES: [f64; 7] = [1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 0.015625];
 /// Largest change of a number, as a share of its prior, at which the linearisations end.
@@ -35,7 +37,7 @@ const ROUNDING: f64 = 1e-12;
 /// Rise of χ² at two standard uncertainties, if it is parabolic: 4. Between these limits it counts as that.
 const PARABOLIC: [f64; 2] = [3.0, 5.3];
 /// The 95 % quantile of χ² with one degree of freedom.
-pub const QUANTILE_95: f64 = 3.841_458_820_694_124;
+pub(super) const QUANTILE_95: f64 = 3.841_458_820_694_124;
 /// Steps of the search for an end of an interval.
 const MAX_STEPS: usize = 24;
 /// Relative accuracy of the rise of χ² at an end.
@@ -55,11 +57,25 @@ pub struct NumberInterval {
     pub ends: [f64; 2],
 }
 
-/// As [`fit`], with the estimated numbers of shapes moved to their best values in the problem.
+/// As [`fit`], with the estimated numbers and positions of shapes moved to their best values in the problem.
 ///
 /// # Errors
 /// As [`fit`].
 pub(crate) fn fit_with_numbers(problem: &mut Problem, start: Option<&[f64]>) -> Result<Fit, IdentifyError> {
+    let mut found = at_positions(problem, start)?;
+    for _ in 0..MAX_MOVES {
+        let Some((mut moved, from)) = positions::moved(problem, &found.beta)? else { break };
+        let next = at_positions(&mut moved, Some(&from))?;
+        if moved.sum_of_squares(&next.beta) >= problem.sum_of_squares(&found.beta) {
+            break;
+        }
+        (*problem, found) = (moved, next);
+    }
+    Ok(found)
+}
+
+/// The fit with the positions that the shapes have.
+fn at_positions(problem: &mut Problem, start: Option<&[f64]>) -> Result<Fit, IdentifyError> {
     if !problem.parameters.has_numbers() {
         return fit(problem, start);
     }

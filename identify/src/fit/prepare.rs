@@ -7,9 +7,9 @@ use abbe_model::session::Session;
 use abbe_model::session::limits::MIN_UM;
 use faer::Mat;
 
-use super::Fit;
 use super::families::{FoldEquations, families};
 use super::numbers::{fit_with_numbers, intervals};
+use super::{Fit, positions};
 use crate::error::IdentifyError;
 use crate::heldout::{rms_by_unit_mm, rms_mm};
 use crate::noise::outliers;
@@ -45,6 +45,7 @@ pub fn prepare(session: &Session, seed: u64) -> Result<(Problem, Fit), IdentifyE
 pub fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), IdentifyError> {
     let (problem, mut fit) = prepare_at_noise(session, effects, seed)?;
     fit.intervals = intervals(&problem, &fit)?;
+    fit.positions = positions::at_solution(&problem, &fit)?;
     Ok((problem, fit))
 }
 
@@ -55,6 +56,7 @@ pub fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> Result<
 pub fn refit(problem: &mut Problem, present: &Fit) -> Result<Fit, IdentifyError> {
     let mut fit = fit_with_numbers(problem, Some(&present.beta))?;
     fit.intervals = intervals(problem, &fit)?;
+    fit.positions = positions::at_solution(problem, &fit)?;
     Ok(fit)
 }
 

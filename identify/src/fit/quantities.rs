@@ -1,9 +1,10 @@
-//! The quantities that a fit reports: identifiable parameters, amplitude and phase of harmonics, and the rms of spectra.
+//! The quantities that a fit reports: identifiable parameters, amplitude and phase of harmonics, the rms of spectra, and
+//! the positions of steps.
 
-use super::Fit;
-use crate::numerics::rank::Rank;
+use super::{Fit, StepPosition};
 use crate::parameters::Role;
 use crate::problem::Problem;
+use crate::unit::Unit;
 
 /// A reported quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,6 +15,8 @@ pub(crate) enum Quantity {
     Harmonic(usize),
     /// Rms over a period of a sum of cosines and sines: `√(Σ c²/2)`. The first coefficient and their number.
     Rms(usize, usize),
+    /// An estimated position of a step, by index among [`Fit::positions`].
+    Position(usize),
 }
 
 /// The rms over a period of a sum of cosines and sines with some coefficients.
@@ -27,8 +30,8 @@ pub(crate) fn u_of_undetermined_phase_deg() -> f64 {
 }
 
 /// The reported quantities in their order: those of the identifiable parameters.
-pub(crate) fn quantities(problem: &Problem, rank: &Rank) -> Vec<Quantity> {
-    let list = &problem.parameters.list;
+pub(crate) fn quantities(problem: &Problem, fit: &Fit) -> Vec<Quantity> {
+    let (list, rank) = (&problem.parameters.list, &fit.rank);
     let mut quantities = Vec::new();
     let mut j = 0;
     while j < list.len() {
@@ -50,6 +53,11 @@ pub(crate) fn quantities(problem: &Problem, rank: &Rank) -> Vec<Quantity> {
         if rank.is_identifiable(j) {
             quantities.push(Quantity::Parameter(j));
         }
+        if let Role::Coefficient { effect, coefficient } = list[j].role {
+            let is_last = coefficient + 1 == problem.parameters.effects[effect].shape.coefficients();
+            let own = (0..fit.positions.len()).filter(|k| is_last && fit.positions[*k].effect == effect);
+            quantities.extend(own.map(Quantity::Position));
+        }
         j += 1;
     }
     quantities
@@ -69,6 +77,12 @@ pub(crate) fn values_at(
         match *quantity {
             Quantity::Parameter(j) => accept(problem.parameters.value(j, beta) * list[j].unit.display_per_internal),
             Quantity::Rms(j, count) => accept(rms_of_waves(&beta[j..j + count]) * list[j].unit.display_per_internal),
+            Quantity::Position(k) => {
+                let StepPosition { effect, step, .. } = fit.positions[k];
+                let effect = &problem.parameters.effects[effect];
+                let unit = Unit::of_number(&problem.session, effect);
+                accept(effect.shape.positions()[step] * unit.display_per_internal);
+            }
             Quantity::Harmonic(j) => {
                 accept(beta[j].hypot(beta[j + 1]) * list[j].unit.display_per_internal);
                 let (a, b) = (fit.beta[j], fit.beta[j + 1]);
@@ -105,13 +119,13 @@ mod tests {
             ))
             .unwrap();
         let mut fit = fit(&problem, None).unwrap();
-        let quantities = quantities(&problem, &fit.rank);
+        let quantities = quantities(&problem, &fit);
         let (place, j) = quantities
             .iter()
             .enumerate()
             .find_map(|(place, quantity)| match quantity {
                 Quantity::Harmonic(j) => Some((place, *j)),
-                Quantity::Parameter(_) | Quantity::Rms(..) => None,
+                Quantity::Parameter(_) | Quantity::Rms(..) | Quantity::Position(_) => None,
             })
             .unwrap();
         let coefficients = |amplitude_um: f64, phase_deg: f64| {

@@ -4,22 +4,22 @@ use std::collections::BTreeMap;
 
 use super::outcome::{self, Determined};
 use super::quantities::{Quantity, quantities, rms_of_waves, u_of_undetermined_phase_deg};
-use super::{Fit, covariance, enlargement_warning};
-use super::{aliases, assume};
+use super::{Fit, StepPosition, covariance, enlargement_warning};
+use super::{assume, cover};
 use crate::circular;
 use crate::error::IdentifyError;
 use crate::heldout::cross_validation;
 use crate::heldout::{mislabelled_runs, rms_by_unit_mm, rms_mm};
 use crate::noise;
 use crate::numerics::rank::Rank;
-use crate::parameter_description::parameter_meaning;
+use crate::parameter_description::{coefficient_meaning, parameter_meaning};
 use crate::plausibility;
 use crate::positioning::{self, diagonal};
 use crate::problem::Problem;
 use crate::results::{FitResult, OfAngles, Outlier, ParameterResult, Unobservable, phases_follow_amplitudes};
 use crate::straightness;
 use crate::tolerance::conformity;
-use crate::unit::ARCSEC;
+use crate::unit::{ARCSEC, Unit};
 
 /// The fit in its reported form.
 ///
@@ -103,16 +103,24 @@ pub fn rms_of_units(problem: &Problem, residuals: &[Vec<f64>], held_out: &[Vec<f
     }
 }
 
-/// The identifiable parameters, in display units, with uncertainties that cover aliases. A harmonic has amplitude and phase of
-/// `amplitude · cos(order · angle + phase)`.
+/// The identifiable parameters, in display units, with uncertainties that cover aliases and positions of steps. A harmonic
+/// has amplitude and phase of `amplitude · cos(order · angle + phase)`.
 pub fn parameters(problem: &Problem, fit: &Fit) -> Vec<ParameterResult> {
+    let mut parameters = parameters_of_noise(problem, fit);
+    cover::cover(&mut parameters, problem, fit);
+    parameters
+}
+
+/// The same with the uncertainties from the noise alone.
+pub(crate) fn parameters_of_noise(problem: &Problem, fit: &Fit) -> Vec<ParameterResult> {
     let list = &problem.parameters.list;
     let u_internal = |j: usize| fit.covariance[(j, j)].max(0.0).sqrt() * fit.u_enlargement;
     let mut results = Vec::new();
-    for quantity in quantities(problem, &fit.rank) {
+    for quantity in quantities(problem, fit) {
         match quantity {
             Quantity::Harmonic(j) => results.extend(amplitude_and_phase(problem, fit, j)),
             Quantity::Rms(j, count) => results.push(rms_of_spectrum(problem, fit, j, count)),
+            Quantity::Position(k) => results.push(position(problem, &fit.positions[k])),
             Quantity::Parameter(j) => {
                 let unit = &list[j].unit;
                 let value = problem.parameters.value(j, &fit.beta) * unit.display_per_internal;
@@ -126,8 +134,19 @@ pub fn parameters(problem: &Problem, fit: &Fit) -> Vec<ParameterResult> {
             }
         }
     }
-    aliases::cover(&mut results, problem, fit);
     results
+}
+
+/// An estimated position of a step, in the unit of its driver.
+fn position(problem: &Problem, position: &StepPosition) -> ParameterResult {
+    let StepPosition { effect: number, step, u, interval_95, .. } = *position;
+    let effect = &problem.parameters.effects[number];
+    let Unit { name, display_per_internal } = Unit::of_number(&problem.session, effect);
+    let [value, u] = [effect.shape.positions()[step], u].map(|value| value * display_per_internal);
+    let id = problem.parameters.position_id(number, step);
+    let meaning = coefficient_meaning(&problem.session.machine, effect, "position");
+    let interval_95 = interval_95.map(|ends| ends.map(|end| end * display_per_internal));
+    ParameterResult { interval_95, ..ParameterResult::new(&id, value, u, &name).with_meaning(meaning) }
 }
 
 /// The rms of a spectrum over a period, with the uncertainty by propagation.

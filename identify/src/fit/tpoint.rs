@@ -57,7 +57,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<PointingTerms, IdentifyErr
     let sigma_per_u = sky_rms / (problem.noise.sigma_mm * fit.u_enlargement);
     let list = &problem.parameters.list;
     let sizes = problem.parameters.sizes();
-    let covariance = fit.covariance_with_aliases();
+    let covariance = fit.whole_covariance();
     let mut found = Vec::new();
     for name in &names_in_order() {
         let of: Vec<(usize, f64)> = (0..list.len())

@@ -12,6 +12,8 @@ use crate::error::IdentifyError;
 
 /// The basis functions of an effect over the readings of a test.
 pub(super) struct BasisOverTest {
+    /// The value of the driver at each reading.
+    pub driver: Vec<f64>,
     /// One column per coefficient.
     pub columns: Vec<Arc<Vec<f64>>>,
     /// The slots that the readings depend on, each with the basis functions as they act on it.
@@ -69,7 +71,7 @@ impl BasisOverTest {
                 slots.push((slot, of_part.iter().map(scaled).collect()));
             }
         }
-        Ok(Some(BasisOverTest { columns, slots }))
+        Ok(Some(BasisOverTest { driver: samples.iter().map(|sample| sample.value).collect(), columns, slots }))
     }
 
     /// The contributions of its coefficients, which begin with the parameter `first`.

@@ -68,7 +68,10 @@ impl<'p> Refit<'p> {
             starts,
             priors,
             distances,
-            quantities: quantities(problem, &fit.rank),
+            quantities: quantities(problem, fit)
+                .into_iter()
+                .filter(|one| !matches!(one, Quantity::Position(_)))
+                .collect(),
             end: fit.rank.coordinates(&fit.beta, &problem.parameters.sizes()),
             inverse: reduced.covariance(&Mat::identity(basis.ncols(), basis.ncols()))?,
             u,
@@ -109,7 +112,7 @@ impl Function for Refit<'_> {
 
     fn outputs(&self) -> usize {
         let of = |quantity: &Quantity| match quantity {
-            Quantity::Parameter(_) | Quantity::Rms(..) => 1,
+            Quantity::Parameter(_) | Quantity::Rms(..) | Quantity::Position(_) => 1,
             Quantity::Harmonic(_) => 2,
         };
         self.quantities.iter().map(of).sum()

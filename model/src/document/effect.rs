@@ -17,6 +17,9 @@ pub fn internal(unit: InternalUnit) -> f64 {
     if unit == InternalUnit::Radian { ARCSECOND } else { MICROMETRE }
 }
 
+/// The word in `estimate` for the positions of a shape: the key of steps.
+pub const POSITIONS: &str = "at";
+
 /// An effect that the user declares.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename = "effect")]
@@ -41,8 +44,8 @@ pub struct Effect {
     pub family: Option<String>,
     /// The tests in which it acts; default: all.
     pub tests: Option<Vec<String>>,
-    /// Numbers of the shape that a fit estimates, from the values given here: "centre", "width", "period" or "tau";
-    /// default: none.
+    /// Numbers of the shape that a fit estimates, from the values given here: "centre", "width", "period", "tau", or "at"
+    /// for the positions of steps; default: none.
     pub estimate: Option<Vec<String>>,
     /// Whether the effect is taken for the explanation on the user's word, so that uncertainties do not cover its
     /// aliases; default: false.

@@ -59,9 +59,10 @@ pub fn effect(effect: &Effect, machine: &chain::Machine) -> effect::Effect {
         shape: effect.shape.entry().word.to_string(),
         keys: keys.finish(),
         tests: (!effect.tests.is_empty()).then(|| effect.tests.clone()),
-        estimate: (!effect.estimated.is_empty()).then(|| {
+        estimate: (!effect.estimated.is_empty() || effect.positions_estimated).then(|| {
             let names = effect.shape.number_names();
-            effect.estimated.iter().filter_map(|which| names.get(*which)).map(ToString::to_string).collect()
+            let numbers = effect.estimated.iter().filter_map(|which| names.get(*which)).copied();
+            numbers.chain(effect.positions_estimated.then_some(effect::POSITIONS)).map(ToString::to_string).collect()
         }),
         assumed: effect.assumed.then_some(true),
         alias: effect.aliases.iter().map(|alias| self::effect(alias, machine)).collect(),

@@ -57,6 +57,8 @@ pub struct Effect {
     /// The numbers of the shape that a fit estimates from the values of the shape, by index among
     /// [`ShapeKind::number_names`](shape::ShapeKind::number_names).
     pub estimated: Vec<usize>,
+    /// Whether a fit estimates the positions of the shape ([`ShapeKind::positions`](shape::ShapeKind::positions)).
+    pub positions_estimated: bool,
     /// Whether the effect is taken for the explanation on the user's word, so that uncertainties do not cover its
     /// aliases.
     pub assumed: bool,
@@ -77,20 +79,22 @@ impl Effect {
             prior,
             aliases: Vec::new(),
             estimated: Vec::new(),
+            positions_estimated: false,
             assumed: false,
         }
     }
 
     /// The effect without its aliases, with all numbers of its shape as they are.
     pub fn alone(&self) -> Effect {
-        Effect { aliases: Vec::new(), estimated: Vec::new(), assumed: false, ..self.clone() }
+        let (aliases, estimated) = (Vec::new(), Vec::new());
+        Effect { aliases, estimated, positions_estimated: false, assumed: false, ..self.clone() }
     }
 
-    /// The effect with all numbers of its shape that can be estimated declared so.
+    /// The effect with all numbers and positions of its shape that can be estimated declared so.
     #[must_use]
     pub fn with_estimated_numbers(self) -> Effect {
         let estimated = (0..self.shape.number_names().len()).collect();
-        Effect { estimated, ..self }
+        Effect { estimated, positions_estimated: !self.shape.positions().is_empty(), ..self }
     }
 
     /// Whether another effect is the same, whatever the aliases of both.
@@ -98,11 +102,15 @@ impl Effect {
         self.alone() == other.alone()
     }
 
-    /// Whether another effect is the same but for numbers of its shape that are estimated.
+    /// Whether another effect is the same but for numbers and positions of its shape that are estimated.
     pub fn is_same_but_for_numbers(&self, other: &Effect) -> bool {
         let with_number = |shape: Shape, which: &usize| shape.with_number(*which, other.shape.number(*which));
-        let shape = self.estimated.iter().fold(self.shape.clone(), with_number);
-        self.estimated == other.estimated && Effect { shape, ..self.alone() } == other.alone()
+        let mut shape = self.estimated.iter().fold(self.shape.clone(), with_number);
+        let estimated = |effect: &Effect| (effect.estimated.clone(), effect.positions_estimated);
+        if self.positions_estimated && shape.positions().len() == other.shape.positions().len() {
+            shape = shape.with_positions(other.shape.positions().to_vec());
+        }
+        estimated(self) == estimated(other) && Effect { shape, ..self.alone() } == other.alone()
     }
 
     /// The aliases that uncertainties cover: none if the effect is assumed.

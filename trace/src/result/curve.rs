@@ -4,7 +4,7 @@
 //! reading nearby are marked: there the prior determines the curve.
 
 use abbe_identify::fit::Fit;
-use abbe_identify::fit::contribution_of_aliases;
+use abbe_identify::fit::contribution_beside_noise;
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::CurvePoint;
@@ -108,7 +108,7 @@ pub(super) fn curve_of(problem: &Problem, fit: &Fit, number: usize) -> Vec<Curve
             let value = value_at(&fit.beta);
             let column = Mat::from_fn(basis.len(), 1, |k, _| basis[k]);
             let variance = (column.transpose() * (&covariance * &column))[(0, 0)];
-            let moved = contribution_of_aliases(fit, 1, |beta| vec![value_at(beta)]);
+            let moved = contribution_beside_noise(fit, 1, |beta| vec![value_at(beta)]);
             CurvePoint {
                 at: q * at_outside,
                 value: value * outside,
@@ -162,6 +162,8 @@ mod tests {
         fit.u_enlargement = 1.5;
         let enlarged = curve_of(&problem, &fit, number);
         assert_eq!(by_noise.len(), CURVE_POINTS);
+        let spaced = |k: usize| 360.0 * k as f64 / (CURVE_POINTS - 1) as f64;
+        assert!((0..CURVE_POINTS).all(|k| (by_noise[k].at - spaced(k)).abs() < 1e-9), "{by_noise:?}");
         for (by_noise, enlarged) in by_noise.iter().zip(&enlarged) {
             assert!(by_noise.u > 0.0);
             assert!((enlarged.u / by_noise.u - 1.5).abs() < 1e-12);

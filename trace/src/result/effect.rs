@@ -15,7 +15,6 @@ use faer::Mat;
 
 use super::curve::{curve_of, curve_units};
 use super::prediction::Predictions;
-use super::steps;
 use super::{HeldOut, TraceFindings};
 use crate::candidates::library::Family;
 
@@ -126,7 +125,8 @@ pub(super) fn described(
     let (machine, effect) = (&problem.session.machine, &problem.parameters.effects[number]);
     let (curve_at_unit, curve_unit) = curve_units(problem, effect);
     let meaning = meaning(machine, effect);
-    let intervals = steps::intervals(problem, fit, number)?;
+    let own = fit.positions.iter().filter(|position| position.effect == number);
+    let intervals: Vec<Option<[f64; 2]>> = own.map(|position| position.interval_95).collect();
     Ok(EffectResult {
         reading_unit: problem.unit(),
         name: effect_name(machine, effect),
@@ -226,4 +226,38 @@ fn effective_parameters(problem: &Problem, covariance: &Mat<f64>, effect: usize)
         }
     }
     Some(effective)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use abbe_files::ReadOptions;
+    use abbe_identify::fit::prepare;
+    use abbe_model::driver::Driver;
+    use abbe_model::effect::shape::Polynomial;
+    use abbe_model::effect::{CoefficientPrior, Component};
+
+    use super::*;
+
+    /// A coefficient whose variance is a quarter of that of its prior counts as three quarters. Effects count each their own.
+    #[test]
+    fn effective_parameters_are_those_of_one_effect() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let (mut problem, _) = prepare(&abbe_files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
+        let scales = [Some(1e-3), Some(2e-3), None];
+        for (name, scale) in ["EXC", "EYC", "EZC"].into_iter().zip(scales) {
+            let shape = Shape::Polynomial(Polynomial { degree: 2, scale: 1.0 });
+            let effect = Effect::new(Component::parse(name).unwrap(), Driver::parse("C"), shape);
+            let prior = scale.map_or(CoefficientPrior::Flat, CoefficientPrior::Scale);
+            problem.add_effect(&Effect { prior, ..effect }).unwrap();
+        }
+        let count = problem.parameters.list.len();
+        let covariance = Mat::from_fn(count, count, |i, j| if i == j { 2.5e-7 } else { 0.0 });
+        let coefficients = problem.parameters.effects[0].shape.coefficients() as f64;
+        let effective = [0, 1, 2].map(|effect| effective_parameters(&problem, &covariance, effect));
+        assert!((effective[0].unwrap() - 0.75 * coefficients).abs() < 1e-9, "{effective:?}");
+        assert!((effective[1].unwrap() - 0.9375 * coefficients).abs() < 1e-9, "{effective:?}");
+        assert_eq!(effective[2], None);
+    }
 }

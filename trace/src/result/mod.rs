@@ -6,7 +6,6 @@ mod effect;
 mod poses;
 mod prediction;
 mod rejected;
-mod steps;
 mod verdict;
 
 use abbe_identify::error::IdentifyError;
@@ -178,11 +177,14 @@ fn residual_variance(findings: &TraceFindings<'_>) -> f64 {
     if !findings.search.policy.in_residual_variance {
         return 1.0;
     }
-    let residuals = findings.after_fit.residuals.iter().flatten();
     // The evidence uses the noise of the search.
-    let sigma_mm = findings.before.noise.sigma_mm;
-    let sum: f64 = residuals.map(|v| (v / sigma_mm).powi(2)).sum();
-    (sum / findings.search.columns.rows().max(1) as f64).max(1.0)
+    relative_variance(&findings.after_fit.residuals, findings.before.noise.sigma_mm, findings.search.columns.rows())
+}
+
+/// Variance of residuals, by test, mm, over that of the noise; at least 1. `rows` is the number of residuals that count.
+fn relative_variance(residuals: &[Vec<f64>], sigma_mm: f64, rows: usize) -> f64 {
+    let sum: f64 = residuals.iter().flatten().map(|v| (v / sigma_mm).powi(2)).sum();
+    (sum / rows.max(1) as f64).max(1.0)
 }
 
 /// The declared model, on the readings that are not excluded after the search.
@@ -323,6 +325,14 @@ fn changed_parameters(before: &[ParameterResult], after: &[ParameterResult]) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_variance_is_relative_to_that_of_the_noise() {
+        let residuals = [vec![0.003, -0.001], vec![0.002, 0.0]];
+        assert!((relative_variance(&residuals, 1e-3, 4) - 3.5).abs() < 1e-12);
+        assert!((relative_variance(&residuals, 1e-3, 5) - 2.8).abs() < 1e-12);
+        assert_eq!(relative_variance(&residuals, 1.0, 4), 1.0);
+    }
 
     #[test]
     fn parameters_that_change_by_more_than_their_uncertainty_are_listed() {

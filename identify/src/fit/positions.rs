@@ -1,0 +1,494 @@
+//! The positions of steps that a fit estimates.
+//!
+//! χ² is constant in the position `p` of a step until the step passes a reading. It has no derivative by `p`, so that no
+//! Gauss–Newton step can move it. With the other columns of the model projected out of the readings `y` and of the column
+//! `s(p)` of the step,
+//!
+//! ```text
+//! χ²(p) = |y|² − (s(p)·y)² / |s(p)|²
+//! ```
+//!
+//! is the minimum over the height and all other parameters `β`. A fit moves each step to the gap between two readings where
+//! it is least. The 95 % interval of a position ends where `χ²` has risen by the 95 % quantile of one degree of freedom,
+//! enlarged as uncertainties are. Uncertainties of all parameters cover the positions by the law of total variance:
+//!
+//! ```text
+//! u² = u₀² + Σ_p w(p) (β(p) − β)²,    w(p) ∝ Δp·exp(−χ²(p)/2)
+//! ```
+
+use abbe_model::effect::Effect;
+use faer::Mat;
+
+use super::numbers::QUANTILE_95;
+use super::{Fit, Problem};
+use crate::error::IdentifyError;
+use crate::numerics::solve::Svd;
+use crate::parameters::Role;
+
+/// Share of a column that remains after the projection below which the model contains it.
+const CONTAINED: f64 = 1e-9;
+/// Least decrease of χ² for which a step moves.
+const MIN_FALL: f64 = 0.01;
+/// Gaps on each side of a step that are all tried; beyond them the distances grow.
+const EACH: usize = 5;
+/// Gaps between readings that are tried at a time between two others.
+const TRIED_BETWEEN: usize = 8;
+/// Maximum number of times that gaps between others are tried.
+const MAX_PASSES: usize = 10;
+/// Weight of a position from which on the gaps beside it are tried.
+const PROBABLE: f64 = 0.02;
+/// Least weight of a position whose changes of the parameters are covered.
+const MIN_WEIGHT: f64 = 1e-6;
+
+/// An estimated position of a step.
+#[derive(Clone, Debug)]
+pub struct StepPosition {
+    /// Index of the effect.
+    pub effect: usize,
+    /// Index among its positions.
+    pub step: usize,
+    /// Standard uncertainty, internal unit of the driver.
+    pub u: f64,
+    /// The 95 % interval, internal unit of the driver; `None` if the readings do not bound the position.
+    pub interval_95: Option<[f64; 2]>,
+    /// Other positions, by their weight, with the change of each parameter, internal units.
+    pub others: Vec<(f64, Vec<f64>)>,
+}
+
+/// A step with the gaps between readings in which it may lie: from its neighbours on, or from the ends of the readings.
+struct Step<'p> {
+    effect: usize,
+    step: usize,
+    /// Its height, by index among the parameters.
+    height: usize,
+    at: f64,
+    /// The gap in which it lies. Gap `g` begins behind `levels[g - 1]` and ends with `levels[g]`.
+    gap: usize,
+    first: usize,
+    last: usize,
+    /// The values of the driver at the readings, ascending.
+    levels: &'p [f64],
+}
+
+/// A step in another gap, with all other parameters at their best values.
+struct Moved {
+    gap: usize,
+    at: f64,
+    chi_square: f64,
+    /// Change of each parameter.
+    changes: Vec<f64>,
+}
+
+impl Step<'_> {
+    /// A position in a gap: its own, or the middle.
+    fn at(&self, gap: usize) -> f64 {
+        if gap == self.gap { self.at } else { 0.5 * (self.levels[gap - 1] + self.levels[gap]) }
+    }
+
+    /// Gaps at growing distances on both sides, with those at both ends.
+    fn around(&self) -> Vec<usize> {
+        let mut gaps = vec![self.first, self.gap, self.last];
+        let mut distance = 1;
+        while self.gap - distance.min(self.gap) > self.first || self.gap + distance < self.last {
+            gaps.extend(self.gap.checked_sub(distance).filter(|gap| *gap > self.first));
+            gaps.extend(Some(self.gap + distance).filter(|gap| *gap < self.last));
+            distance += (distance / EACH).max(1);
+        }
+        gaps.sort_unstable();
+        gaps.dedup();
+        gaps
+    }
+}
+
+/// Some gaps between two others.
+fn between(low: usize, high: usize) -> Vec<usize> {
+    let count = (high - low).saturating_sub(1).min(TRIED_BETWEEN);
+    (1..=count).map(|k| low + k * (high - low) / (count + 1)).filter(|gap| low < *gap && *gap < high).collect()
+}
+
+/// The levels of each effect whose positions are estimated; empty for others.
+fn levels(problem: &Problem) -> Result<Vec<Vec<f64>>, IdentifyError> {
+    let own = |effect: &Effect| if effect.positions_estimated { problem.levels(effect) } else { Ok(Vec::new()) };
+    problem.parameters.effects.iter().map(own).collect()
+}
+
+/// The steps whose positions are estimated. A driver that takes one value has no gap.
+fn steps<'p>(problem: &Problem, levels: &'p [Vec<f64>]) -> Vec<Step<'p>> {
+    let (parameters, mut found) = (&problem.parameters, Vec::new());
+    for (effect, step) in parameters.positions() {
+        let (levels, positions) = (levels[effect].as_slice(), parameters.effects[effect].shape.positions());
+        let is_height = |role: Role| role == Role::Coefficient { effect, coefficient: step };
+        let height = parameters.list.iter().position(|parameter| is_height(parameter.role));
+        let Some(height) = height.filter(|_| levels.len() > 1) else { continue };
+        let gap_of = |at: f64| levels.partition_point(|level| *level < at).clamp(1, levels.len() - 1);
+        let gap = gap_of(positions[step]);
+        let others = || positions.iter().enumerate().filter(|(k, _)| *k != step).map(|(_, at)| gap_of(*at));
+        let first = others().filter(|other| *other < gap).max().map_or(1, |other| other + 1);
+        let last = others().filter(|other| *other > gap).min().map_or(levels.len() - 1, |other| other - 1);
+        found.push(Step { effect, step, height, at: positions[step], gap, first, last, levels });
+    }
+    found
+}
+
+/// Each step in some gaps, in the order of these. One linearisation at `beta` serves all.
+fn profiles(
+    problem: &Problem,
+    beta: &[f64],
+    steps: &[Step<'_>],
+    gaps: &[Vec<usize>],
+) -> Result<Vec<Vec<Moved>>, IdentifyError> {
+    let mut wide = problem.clone();
+    let mut firsts = Vec::with_capacity(steps.len());
+    let mut added: Vec<(Effect, usize)> = Vec::new();
+    for (step, gaps) in steps.iter().zip(gaps) {
+        let effect = problem.parameters.effects[step.effect].alone();
+        let shape = effect.shape.with_positions(gaps.iter().map(|gap| step.at(*gap)).collect());
+        let tried = Effect { shape, ..effect };
+        // Steps at one position have the same gaps.
+        let first = match added.iter().find(|(present, _)| *present == tried) {
+            Some((_, first)) => *first,
+            None => {
+                let first = wide.parameters.list.len();
+                if !gaps.is_empty() {
+                    wide.add_effect(&tried)?;
+                    added.push((tried, first));
+                }
+                first
+            }
+        };
+        firsts.push(first);
+    }
+    let count = beta.len();
+    let mut at = beta.to_vec();
+    at.resize(wide.parameters.list.len(), 0.0);
+    let (r, c, beside) = wide.prior_triangle(&at).merged(&wide.triangles(&at)?).parts();
+    let sizes = wide.parameters.sizes();
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let mut found = Vec::with_capacity(steps.len());
+    for ((step, gaps), first) in steps.iter().zip(gaps).zip(firsts) {
+        if gaps.is_empty() {
+            found.push(Vec::new());
+            continue;
+        }
+        let others: Vec<usize> = (0..count).filter(|j| *j != step.height).collect();
+        let scaled = Mat::from_fn(r.nrows(), others.len(), |i, k| r[(i, others[k])] * sizes[others[k]]);
+        let svd = Svd::of(scaled.as_ref())?;
+        let rank = svd.identifiable_rank();
+        // A column as its coordinates in the directions of the others, and the rest.
+        let split = |column: &[f64]| {
+            let mut rest = column.to_vec();
+            let along: Vec<f64> = (0..rank)
+                .map(|k| {
+                    let direction = svd.left().col(k);
+                    let along: f64 = direction.iter().zip(column).map(|(u, c)| u * c).sum();
+                    rest.iter_mut().zip(direction.iter()).for_each(|(rest, u)| *rest -= along * u);
+                    along
+                })
+                .collect();
+            (along, rest)
+        };
+        let readings: Vec<f64> = (0..r.nrows()).map(|i| c[i] + r[(i, step.height)] * beta[step.height]).collect();
+        let (along, rest) = split(&readings);
+        let moved = |(k, gap): (usize, &usize)| {
+            let column: Vec<f64> = (0..r.nrows()).map(|i| r[(i, first + k)] * sizes[first + k]).collect();
+            let (along_column, rest_of_column) = split(&column);
+            let square = dot(&rest_of_column, &rest_of_column);
+            let is_contained = square <= CONTAINED * dot(&column, &column);
+            let height = if is_contained { 0.0 } else { dot(&rest_of_column, &rest) / square };
+            let mut changes = vec![0.0; count];
+            changes[step.height] = height * sizes[first + k] - beta[step.height];
+            for direction in 0..rank {
+                let by = (along[direction] - height * along_column[direction]) / svd.singular_values[direction];
+                for (j, v) in others.iter().zip(svd.right().col(direction).iter()) {
+                    changes[*j] += by * v * sizes[*j];
+                }
+            }
+            let chi_square = beside + dot(&rest, &rest) - height * height * square;
+            Moved { gap: *gap, at: step.at(*gap), chi_square, changes }
+        };
+        found.push(gaps.iter().enumerate().map(moved).collect());
+    }
+    Ok(found)
+}
+
+/// Index of the place where χ² is least.
+fn least(profile: &[Moved]) -> Option<usize> {
+    (0..profile.len()).min_by(|a, b| profile[*a].chi_square.total_cmp(&profile[*b].chi_square))
+}
+
+/// The problem with the one step moved that lowers χ² the most, and the parameters there. `None` if none lowers it.
+///
+/// # Errors
+/// If the model cannot be evaluated.
+pub(super) fn moved(problem: &Problem, beta: &[f64]) -> Result<Option<(Problem, Vec<f64>)>, IdentifyError> {
+    let levels = levels(problem)?;
+    let steps = steps(problem, &levels);
+    if steps.is_empty() {
+        return Ok(None);
+    }
+    let gaps: Vec<Vec<usize>> = steps.iter().map(Step::around).collect();
+    let found = profiles(problem, beta, &steps, &gaps)?;
+    let found = steps.into_iter().zip(found);
+    let most = found.max_by(|a, b| fall(&a.0, &a.1).total_cmp(&fall(&b.0, &b.1)));
+    let Some((step, mut profile)) = most.filter(|(step, profile)| fall(step, profile) > MIN_FALL) else {
+        return Ok(None);
+    };
+    let beside_least = |profile: &[Moved]| {
+        let Some(best) = least(profile) else { return Vec::new() };
+        let [low, high] = [best.saturating_sub(1), (best + 1).min(profile.len() - 1)].map(|place| profile[place].gap);
+        let gap = profile[best].gap;
+        [between(low, gap), between(gap, high)].concat()
+    };
+    refine(problem, beta, std::slice::from_ref(&step), std::slice::from_mut(&mut profile), |_, own| beside_least(own))?;
+    let Some(best) = least(&profile).map(|best| profile.swap_remove(best)) else { return Ok(None) };
+    let mut problem = problem.clone();
+    let shape = &mut problem.parameters.effects[step.effect].shape;
+    let mut positions = shape.positions().to_vec();
+    positions[step.step] = best.at;
+    *shape = shape.with_positions(positions);
+    let mut beta: Vec<f64> = beta.iter().zip(&best.changes).map(|(value, change)| value + change).collect();
+    problem.linearise_numbers(&mut beta)?;
+    Ok(Some((problem, beta)))
+}
+
+/// By how much χ² falls if a step moves from its own gap to the best one.
+fn fall(step: &Step<'_>, profile: &[Moved]) -> f64 {
+    let own = profile.iter().find(|moved| moved.gap == step.gap);
+    own.zip(least(profile)).map_or(0.0, |(own, best)| own.chi_square - profile[best].chi_square)
+}
+
+/// Tries the gaps between others that `wanted` names for the profile of a step, until it names none.
+fn refine(
+    problem: &Problem,
+    beta: &[f64],
+    steps: &[Step<'_>],
+    found: &mut [Vec<Moved>],
+    wanted: impl Fn(&Step<'_>, &[Moved]) -> Vec<usize>,
+) -> Result<(), IdentifyError> {
+    for _ in 0..MAX_PASSES {
+        let gaps: Vec<Vec<usize>> = steps.iter().zip(&*found).map(|(step, profile)| wanted(step, profile)).collect();
+        if gaps.iter().all(Vec::is_empty) {
+            break;
+        }
+        for (profile, more) in found.iter_mut().zip(profiles(problem, beta, steps, &gaps)?) {
+            profile.extend(more);
+            profile.sort_by_key(|moved| moved.gap);
+        }
+    }
+    Ok(())
+}
+
+/// The estimated positions at a solution.
+///
+/// # Errors
+/// If the model cannot be evaluated.
+pub(super) fn at_solution(problem: &Problem, fit: &Fit) -> Result<Vec<StepPosition>, IdentifyError> {
+    let levels = levels(problem)?;
+    let steps = steps(problem, &levels);
+    if steps.is_empty() {
+        return Ok(Vec::new());
+    }
+    let enlargement = fit.u_enlargement.powi(2);
+    let allowed = |step: &Step<'_>, profile: &[Moved]| {
+        let own = profile.iter().find(|moved| moved.gap == step.gap).map_or(0.0, |own| own.chi_square);
+        own + QUANTILE_95 * enlargement
+    };
+    // The outermost gaps in which χ² has risen by less than is allowed, by their places in the profile.
+    let ends = |step: &Step<'_>, profile: &[Moved]| {
+        let allowed = allowed(step, profile);
+        let mut inside = (0..profile.len()).filter(|place| profile[*place].chi_square <= allowed);
+        let first = inside.next()?;
+        Some([first, inside.next_back().unwrap_or(first)])
+    };
+    let gaps: Vec<Vec<usize>> = steps.iter().map(Step::around).collect();
+    let mut found = profiles(problem, &fit.beta, &steps, &gaps)?;
+    // Gaps between others are tried where the interval ends, and where the position probably lies.
+    refine(problem, &fit.beta, &steps, &mut found, |step, profile| {
+        let Some([first, last]) = ends(step, profile) else { return Vec::new() };
+        let weights = weights(step, profile, enlargement);
+        let is_probable = |place: usize| weights[place].0 > PROBABLE;
+        let is_end = |place: usize| place + 1 == first || place == last;
+        (0..profile.len() - 1)
+            .filter(|place| is_end(*place) || is_probable(*place) || is_probable(*place + 1))
+            .flat_map(|place| between(profile[place].gap, profile[place + 1].gap))
+            .collect()
+    })?;
+    let position = |(step, profile): (Step<'_>, Vec<Moved>)| {
+        let ends = ends(&step, &profile).filter(|[first, last]| *first > 0 && last + 1 < profile.len());
+        let interval = ends.map(|[first, last]| [step.levels[profile[first].gap - 1], step.levels[profile[last].gap]]);
+        let weights = weights(&step, &profile, enlargement);
+        let variance: f64 = (profile.iter().zip(&weights))
+            .map(|(moved, (weight, width))| weight * ((moved.at - step.at).powi(2) + width * width / 12.0))
+            .sum();
+        let others = profile
+            .into_iter()
+            .zip(weights)
+            .filter(|(moved, (weight, _))| moved.gap != step.gap && *weight >= MIN_WEIGHT);
+        StepPosition {
+            effect: step.effect,
+            step: step.step,
+            u: variance.sqrt(),
+            interval_95: interval,
+            others: others.map(|(moved, (weight, _))| (weight, moved.changes)).collect(),
+        }
+    };
+    Ok(steps.into_iter().zip(found).map(position).collect())
+}
+
+/// The weight of each place of a profile, and the width of the driver that it stands for: up to the middle between it and
+/// the next.
+fn weights(step: &Step<'_>, profile: &[Moved], enlargement: f64) -> Vec<(f64, f64)> {
+    let lowest = profile.iter().map(|moved| moved.chi_square).fold(f64::INFINITY, f64::min);
+    let middle = |place: usize| {
+        let [low, high] = [&profile[place], &profile[place + 1]];
+        if low.gap + 1 == high.gap { step.levels[low.gap] } else { 0.5 * (low.at + high.at) }
+    };
+    let width = |place: usize| {
+        let from = place.checked_sub(1).map_or(step.levels[profile[place].gap - 1], middle);
+        let to = if place + 1 < profile.len() { middle(place) } else { step.levels[profile[place].gap] };
+        to - from
+    };
+    let widths: Vec<f64> = (0..profile.len()).map(width).collect();
+    let raw: Vec<f64> = (profile.iter().zip(&widths))
+        .map(|(moved, width)| width * (-0.5 * (moved.chi_square - lowest) / enlargement).exp())
+        .collect();
+    let total: f64 = raw.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+    raw.into_iter().map(|weight| weight / total).zip(widths).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+
+    use abbe_files::ReadOptions;
+    use abbe_model::driver::Driver;
+    use abbe_model::effect::shape::Steps;
+    use abbe_model::effect::{Component, Shape};
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_pcg::Pcg64;
+
+    use super::*;
+    use crate::fit::numbers::fit_with_numbers;
+    use crate::fit::{contribution_beside_noise, fit, prepare};
+
+    /// True positions, rad, and heights, mm, of steps that are added to measured readings.
+    const AT: [f64; 2] = [1.3, 3.6];
+    const HEIGHTS_MM: [f64; 2] = [2.2e-4, -3.5e-4];
+
+    fn with_steps(problem: &Problem, at: [f64; 2]) -> Problem {
+        let mut problem = problem.clone();
+        let shape = Shape::Steps(Steps { at: at.to_vec() });
+        let effect = Effect::new(Component::parse("EZC").unwrap(), Driver::parse("C"), shape);
+        problem.add_effect(&effect.with_estimated_numbers()).unwrap();
+        problem
+    }
+
+    /// The problem of a measured session without steps, with the readings of a model with steps and noise.
+    fn problem() -> Problem {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let (mut problem, _) = prepare(&abbe_files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
+        let truth = with_steps(&problem, AT);
+        let mut beta = vec![0.0; truth.parameters.list.len()];
+        let count = beta.len();
+        beta[count - 2..].copy_from_slice(&HEIGHTS_MM);
+        let mut random = Pcg64::new(1, 2);
+        for (test, residuals) in problem.tests.iter_mut().zip(truth.residuals(&beta)) {
+            let readings = Arc::make_mut(test.readings.as_mut().unwrap());
+            for (observed, residual) in readings.observed.iter_mut().zip(residuals) {
+                let noise: f64 = StandardNormal.sample(&mut random);
+                *observed += problem.noise.sigma_mm * noise - residual;
+            }
+        }
+        problem
+    }
+
+    /// The positions of a problem's steps, which are its last effect.
+    fn positions(problem: &Problem) -> [f64; 2] {
+        problem.parameters.effects.last().unwrap().shape.positions().try_into().unwrap()
+    }
+
+    /// χ² and the parameters of a full fit with the steps at two positions.
+    fn fitted(problem: &Problem, at: [f64; 2]) -> (f64, Vec<f64>) {
+        let moved = with_steps(problem, at);
+        let beta = fit(&moved, None).unwrap().beta;
+        (moved.sum_of_squares(&beta), beta)
+    }
+
+    /// Full fits with a step inside and outside of an end of its interval: χ² has risen by less and by more than the
+    /// quantile. The intervals contain the true positions.
+    #[test]
+    fn an_interval_ends_where_full_fits_have_risen_by_the_quantile() {
+        let problem = problem();
+        let declared = with_steps(&problem, AT);
+        let found = fit(&declared, None).unwrap();
+        let allowed = QUANTILE_95 * found.u_enlargement.powi(2);
+        let (least, _) = fitted(&problem, AT);
+        let estimated = at_solution(&declared, &found).unwrap();
+        assert_eq!(estimated.len(), 2);
+        for (k, position) in estimated.iter().enumerate() {
+            let [low, high] = position.interval_95.unwrap();
+            assert!(low < AT[k] && AT[k] < high && high - low < 1.0, "{low} {high}");
+            let share = position.u / (high - low);
+            assert!(share > 0.1 && share < 0.8, "{share} of {low} {high}");
+            for end in [low, high] {
+                let rise = |share: f64| {
+                    let mut at = AT;
+                    at[k] += share * (end - AT[k]);
+                    fitted(&problem, at).0 - least
+                };
+                let [inside, outside] = [0.998, 1.002].map(rise);
+                assert!(inside < allowed && outside > allowed, "{inside} {allowed} {outside} at {end}");
+            }
+        }
+    }
+
+    /// No other gap between readings has a lower χ², by full fits for each of them; and the contribution to uncertainties is
+    /// that of these fits with their weights.
+    #[test]
+    fn steps_move_to_the_best_gaps_and_uncertainties_cover_the_others() {
+        let problem = problem();
+        let mut estimated = with_steps(&problem, [AT[0] + 0.4, AT[1] - 0.5]);
+        let found = fit_with_numbers(&mut estimated, None).unwrap();
+        let at = positions(&estimated);
+        assert!((at[0] - AT[0]).abs() < 0.2 && (at[1] - AT[1]).abs() < 0.2, "{at:?}");
+        let found = Fit { positions: at_solution(&estimated, &found).unwrap(), ..found };
+        let levels = estimated.levels(estimated.parameters.effects.last().unwrap()).unwrap();
+        let least = estimated.sum_of_squares(&found.beta);
+        let mut variances = vec![0.0; found.beta.len()];
+        for k in 0..2 {
+            let mut total = 0.0;
+            let mut squares = vec![0.0; found.beta.len()];
+            let mut spread = 0.0;
+            for pair in levels.windows(2) {
+                let mut moved = at;
+                moved[k] = 0.5 * (pair[0] + pair[1]);
+                if (moved[k] - at[1 - k]).abs() < pair[1] - pair[0] || (moved[0] < moved[1]) != (at[0] < at[1]) {
+                    continue;
+                }
+                let (sum, beta) = fitted(&problem, moved);
+                assert!(sum > least - 2.0 * MIN_FALL, "{sum} {least} {moved:?}");
+                let weight = (pair[1] - pair[0]) * (-0.5 * (sum - least) / found.u_enlargement.powi(2)).exp();
+                total += weight;
+                spread += weight * ((moved[k] - at[k]).powi(2) + (pair[1] - pair[0]).powi(2) / 12.0);
+                let off = |j: usize| weight * (beta[j] - found.beta[j]).powi(2);
+                squares.iter_mut().enumerate().for_each(|(j, square)| *square += off(j));
+            }
+            variances.iter_mut().zip(&squares).for_each(|(variance, square)| *variance += square / total);
+            let u = found.positions[k].u;
+            // Far gaps, of which few are tried, contribute too.
+            assert!((u / (spread / total).sqrt() - 1.0).abs() < 0.25, "{u} {spread} {total}");
+        }
+        let covered = contribution_beside_noise(&found, found.beta.len(), <[f64]>::to_vec);
+        let mut compared = 0;
+        for (j, variance) in variances.iter().enumerate() {
+            let of_noise = found.covariance[(j, j)].sqrt() * found.u_enlargement;
+            if variance.sqrt() > 0.005 * of_noise {
+                compared += 1;
+                let share = covered[j] / variance.sqrt();
+                assert!((share - 1.0).abs() < 0.25, "{}: {share}", estimated.parameters.list[j].id);
+            }
+        }
+        assert!(compared >= 3, "{compared}");
+    }
+}
