@@ -245,3 +245,20 @@ impl Mul<&Polynomial> for &Polynomial {
         self.product(other, |_| false)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_constant_is_about_a_number() {
+        let two = Polynomial::constant(2.0);
+        assert!(two.is_about(2.0) && two.is_about(2.0 + 1e-13) && !two.is_about(2.1) && !two.is_about(0.0));
+        assert!(Polynomial::default().is_about(0.0) && !Polynomial::default().is_about(1.0));
+        let mut twice = Polynomial::default();
+        twice.insert(Monomial(vec![(Atom::Root(0), 1)]), exactly(2.0));
+        assert!(!twice.is_about(2.0));
+        twice.insert(Monomial::one(), exactly(2.0));
+        assert!(!twice.is_about(2.0));
+    }
+}

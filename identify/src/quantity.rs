@@ -186,6 +186,8 @@ mod tests {
         assert_eq!(value("x=2mm/h", "um/h").unwrap(), 2000.0);
         assert_eq!(value("x=1%", "um/m").unwrap(), 10_000.0);
         assert_eq!(value("x=3s", "ms").unwrap(), 3000.0);
+        // Zero needs no unit, and is zero in each.
+        assert_eq!((value("x=0", "um").unwrap(), value("x=0mm", "um").unwrap()), (0.0, 0.0));
         assert!(value("x=1um", "arcsec").is_err());
         assert!(value("x=1um/h", "um/K").is_err());
     }

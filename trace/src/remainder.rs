@@ -336,4 +336,23 @@ mod tests {
         assert!(together.description.contains("over C"), "{}", together.description);
         assert!((together.excess / in_batches.excess - 1.0).abs() < 1e-9 && together.excess > 1000.0);
     }
+
+    /// A batch ends behind the detectors with which it has as many entries as it may have.
+    #[test]
+    fn a_batch_has_as_many_entries_as_it_may_have() {
+        let (problem, _) = measured();
+        let (all, columns) = (detectors(&problem), Columns::of_readings(&problem));
+        let sizes = |max_entries: usize| {
+            let (mut rest, mut sizes) = (all.as_slice(), Vec::new());
+            while !rest.is_empty() {
+                let batch = Batch::of(rest, &columns, max_entries);
+                sizes.push(rest.len() - batch.rest.len());
+                rest = batch.rest;
+            }
+            sizes
+        };
+        assert_eq!(sizes(MAX_ENTRIES), [all.len()]);
+        assert_eq!(sizes(1).len(), all.len().div_ceil(AT_ONCE));
+        assert!(all.len() > 2 * AT_ONCE, "{}", all.len());
+    }
 }

@@ -99,3 +99,15 @@ pub(crate) fn agreement(
     agreement.largest_derivatives = scales;
     Ok(agreement)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_larger_difference_counts() {
+        for (value, gradient) in [(3e-9, 2e-12), (1e-12, 3e-9)] {
+            assert_eq!(Agreement { value, gradient, ..Agreement::default() }.largest(), 3e-9);
+        }
+    }
+}

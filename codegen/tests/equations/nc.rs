@@ -266,6 +266,11 @@ fn the_path_control_is_stated_and_given_back() {
                 |line: &str| if numbered { line.split_once(' ').unwrap().1.to_string() } else { line.to_string() };
             let lines: Vec<String> = text.lines().map(code).collect();
             let place = |wanted: &str| lines.iter().position(|line| line == wanted);
+            if numbered {
+                // A TNC moves along an arc in the plane of the table without segments.
+                let arcs = lines.iter().filter(|line| line.starts_with("C ")).count();
+                assert_eq!(arcs > 0, name == "XY.h", "{name}: {arcs} arcs");
+            }
             let motion = |line: &&String| line.starts_with("G1 ") || line.starts_with("L ");
             let first = lines.iter().position(|line| motion(&line)).unwrap();
             let last = lines.len() - 1 - lines.iter().rev().position(|line| motion(&line)).unwrap();
@@ -408,9 +413,16 @@ fn the_tool_point_stays_over_its_place_of_the_table() {
 fn axes_move_along_a_diagonal_together_or_in_turn() {
     let place = folder("diagonals");
     let linear = ["X", "Y", "Z"].iter().zip(["[1, 0, 0]", "[0, 1, 0]", "[0, 0, 1]"]);
-    // X ends where the diagonal does, and Y a millimetre farther.
-    let travel = [300, 101, 400];
-    let axes: String = (linear.zip(travel))
+    // X ends where the diagonal does, or half a millimetre farther, and Y a millimetre farther.
+    for end in [300.0, 300.5] {
+        diagonals(&place, linear.clone().zip([end, 101.0, 400.0]), end);
+    }
+    std::fs::remove_dir_all(place).unwrap();
+}
+
+/// The tool goes along a diagonal, and beyond it as far as X goes, at `last_mm`.
+fn diagonals<'a>(place: &Path, axes: impl Iterator<Item = ((&'a &'a str, &'a str), f64)>, last_mm: f64) {
+    let axes: String = axes
         .map(|((axis, way), end)| format!("axis.{axis} = {{ direction = {way}, travel_mm = [-{end}, {end}] }}\n"))
         .collect();
     let mut text = format!(
@@ -434,7 +446,8 @@ fn axes_move_along_a_diagonal_together_or_in_turn() {
             // Together: one block for each of four traversals; in turn: three for each of ten steps.
             let measured = moves.iter().filter(|own| own.run.is_some()).count();
             assert_eq!(measured, if test.name == "steps" { 4 * 30 } else { 4 }, "{}", control.word());
+            let reached = moves.iter().flat_map(|own| &own.points).map(|point| point[&'X'].abs()).fold(0.0, f64::max);
+            assert!((reached - last_mm).abs() < 0.01, "{}: {reached}", control.word());
         }
     }
-    std::fs::remove_dir_all(place).unwrap();
 }

@@ -260,6 +260,12 @@ mod tests {
 
     /// The problem of a measured session with readings that its model predicts exactly, with a bump at other numbers.
     fn problem() -> Problem {
+        let [_, problem] = problems();
+        problem
+    }
+
+    /// The same before the bump is among its effects, and with it.
+    fn problems() -> [Problem; 2] {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
         let session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
         let (mut problem, _) = prepare(&session, 1).unwrap();
@@ -273,8 +279,21 @@ mod tests {
             let readings = Arc::make_mut(test.readings.as_mut().unwrap());
             readings.observed.iter_mut().zip(residuals).for_each(|(observed, residual)| *observed -= residual);
         }
+        let without_bump = problem.clone();
         problem.add_effect(&bump(START_NUMBERS)).unwrap();
-        problem
+        [without_bump, problem]
+    }
+
+    /// A bump has a positive width.
+    #[test]
+    fn a_number_changes_within_what_its_shape_permits() {
+        let problem = problem();
+        let mut beta = vec![0.0; problem.parameters.list.len()];
+        let width = beta.len() - 1;
+        for (change, is_valid) in [(0.0, true), (2.0, true), (-0.3, true), (-0.5, false)] {
+            beta[width] = change;
+            assert_eq!(problem.has_valid_numbers(&beta), is_valid, "{change}");
+        }
     }
 
     /// The covariance is the inverse of `JᵀJ` with `J` by difference quotients of the readings, the numbers among the
@@ -324,8 +343,8 @@ mod tests {
     /// At an end of the interval χ², minimised over the rest, is higher by the quantile.
     #[test]
     fn an_interval_ends_where_chi_square_has_risen_by_the_quantile() {
-        let mut problem = problem();
-        problem.noise.sigma_mm *= 10.0;
+        let [mut without_bump, mut problem] = problems();
+        [&mut without_bump, &mut problem].into_iter().for_each(|problem| problem.noise.sigma_mm *= 10.0);
         let fit = fit_with_numbers(&mut problem, None).unwrap();
         let parameter = fit.beta.len() - 1;
         let u = fit.covariance[(parameter, parameter)].sqrt();
@@ -335,6 +354,20 @@ mod tests {
             let rise = profile.rise(end).unwrap().unwrap();
             assert!((rise / QUANTILE_95 - 1.0).abs() < 2.0 * END_TOLERANCE, "{rise} at {end}");
         }
+        // χ² is steeper towards narrow bumps. Fits of a width that is held, from other numbers, show on which side.
+        let [narrower, wider] = [-2.0 * u, 2.0 * u].map(|change| {
+            let mut held = without_bump.clone();
+            let shape = problem.parameters.effects.last().unwrap().shape.clone();
+            let width = shape.number(1) + change;
+            let centre = Effect { estimated: vec![0], ..bump([START_NUMBERS[0], width]) };
+            held.add_effect(&centre).unwrap();
+            let refitted = fit_with_numbers(&mut held, None).unwrap();
+            let rise = held.sum_of_squares(&refitted.beta) - profile.least;
+            let of_profile = profile.rise(change).unwrap().unwrap();
+            assert!((of_profile / rise - 1.0).abs() < 0.01, "{of_profile} and {rise} at {change}");
+            rise
+        });
+        assert!((narrower / wider - 1.0).abs() > 0.05, "{narrower} {wider}");
         let near = profile.rise(0.05 * u).unwrap().unwrap();
         assert!((near / 0.0025 - 1.0).abs() < 0.1, "parabolic near the minimum: {near}");
     }

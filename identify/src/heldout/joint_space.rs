@@ -226,4 +226,17 @@ mod tests {
         let centres = plus_plus(&points, 3, &mut Pcg64::seed_from_u64(1));
         assert_eq!(centres.len(), 1);
     }
+
+    /// Blocks have three poses each: six poses have two blocks, five none.
+    #[test]
+    fn two_blocks_need_six_poses() {
+        let machine = Machine::from_code("w C b X t").unwrap();
+        for (count, wanted) in [(5, None), (6, Some(2)), (8, Some(2)), (9, Some(3))] {
+            let along = |k: usize| (k * k) as f64;
+            let positions = vec![(0..count).map(along).collect(); 2];
+            let readings = Readings { positions, ..Readings::default() };
+            let found = blocks(&machine, &[&readings], 1).map(|blocks| blocks.into_iter().max().unwrap_or(0) + 1);
+            assert_eq!(found, wanted, "{count} poses");
+        }
+    }
 }

@@ -310,7 +310,29 @@ pub fn nominal_misfit(session: &Session) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::one_clause;
+    use std::path::Path;
+
+    use abbe_files::ReadOptions;
+
+    use super::{ANOTHER_SESSION, ConflictKind, one_clause, residual};
+    use crate::fit::prepare;
+
+    /// The test with the least residual decides: 99 times its noise is an effect, 101 times another session.
+    #[test]
+    fn readings_of_another_session_leave_a_residual_in_every_test() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let (mut problem, fit) = prepare(&abbe_files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
+        let rms = |residuals: &Vec<f64>| {
+            (residuals.iter().map(|value| value * value).sum::<f64>() / residuals.len() as f64).sqrt()
+        };
+        let least = fit.residuals.iter().map(rms).fold(f64::INFINITY, f64::min);
+        assert!(problem.rejected.iter().flatten().all(|rejected| !rejected), "no outliers");
+        for (times, is_another) in [(0.99, false), (1.01, true)] {
+            problem.noise.sigma_mm = least / (times * ANOTHER_SESSION);
+            let found = residual(&problem, &fit);
+            assert_eq!(found.map(|conflict| conflict.kind), is_another.then_some(ConflictKind::Residual), "{times}");
+        }
+    }
 
     #[test]
     fn clauses_of_one_kind_share_their_words() {

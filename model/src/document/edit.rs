@@ -487,4 +487,15 @@ mod tests {
             "[machine]\n# ours\nchain = \"w X b Y t\" # two axes\n\n[machine.axis.X]\ntravel_mm = [0, 1]\n\n";
         assert_eq!(text, format!("{expected}{}", &SESSION[SESSION.find("[instrument]").unwrap()..]));
     }
+
+    /// Tests in a line are left out as those in tables are.
+    #[test]
+    fn tests_are_left_out_in_either_form() {
+        let inline = "test = [{ name = \"A\" }, { name = \"B\" }]\n";
+        let tables = "[[test]]\nname = \"A\"\n[[test]]\nname = \"B\"\n";
+        for text in [inline, tables] {
+            let kept = edited(text, |text| text.keep_tests(&|name| name == "B"));
+            assert!(kept.contains("\"B\"") && !kept.contains("\"A\""), "{kept}");
+        }
+    }
 }

@@ -112,3 +112,17 @@ pub(super) fn direction_in_words(direction: [f64; 3]) -> String {
         None => format!("[{}]", direction.map(|x| number((x * 1e4).round() / 1e4)).join(", ")),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_component_of_a_direction_becomes_positive() {
+        let machine = Machine::from_code("w b X Y Z t").unwrap();
+        let positive = |direction: [f64; 3]| Travel { machine: &machine, axis: 0, direction }.positive();
+        assert_eq!(positive([-0.8, 0.6, 0.0]), [0.8, -0.6, 0.0]);
+        assert_eq!(positive([0.6, -0.8, 0.0]), [-0.6, 0.8, 0.0]);
+        assert_eq!(positive([0.6, 0.0, 0.8]), [0.6, 0.0, 0.8]);
+    }
+}

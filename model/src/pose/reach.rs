@@ -145,3 +145,44 @@ fn distance(machine: &Machine, positions: &[f64], last: &[f64]) -> f64 {
     let axes = machine.axes.iter().zip(positions).zip(last);
     axes.map(|((axis, a), b)| ((a - b) * lever_mm(axis.kind)).abs()).fold(0.0, f64::max)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+
+    /// A tool that points the opposite way has no angle to the wanted axis whose sine does not vanish: the machine turns it
+    /// nevertheless.
+    #[test]
+    fn a_tool_that_points_the_opposite_way_is_turned() {
+        let machine = Machine::from_code("w b X Y Z A t").unwrap();
+        let tool_mm = [0.0, 0.0, -100.0];
+        let [z, a] = ["Z", "A"].map(|name| machine.axis_index(name).unwrap());
+        let at = |position: f64, angle: f64| {
+            let mut positions = vec![0.0; machine.axes.len()];
+            (positions[z], positions[a]) = (position, angle);
+            positions
+        };
+        let pose = |positions: &[f64]| Pose::nominal(&machine, &machine.axis_positions(positions), tool_mm);
+        let (wanted, last) = (pose(&at(0.0, PI)), at(200.0, 0.0));
+        assert!((pose(&last).point_mm - wanted.point_mm).norm() < 1e-9, "the tool point is there already");
+        let found = axis_positions(&machine, tool_mm, Aim::PositionAndAxis, &wanted, &last).unwrap();
+        assert!((found[a].abs() - PI).abs() < 1e-6 && found[z].abs() < 1e-5, "{found:?}");
+    }
+
+    /// A tool point that only Z reaches up to two angles of the head: the nearer of the two counts.
+    #[test]
+    fn the_nearest_solution_counts() {
+        let machine = Machine::from_code("w b Y Z A t").unwrap();
+        let a = machine.axis_index("A").unwrap();
+        let tool_mm = [0.0, 0.0, -100.0];
+        let wanted = Pose::nominal(&machine, &machine.axis_positions(&[0.0; 3]), tool_mm);
+        for (last, wanted_angle) in [(0.4, 0.0), (-0.4, 0.0), (6.0, TAU), (-6.5, -TAU)] {
+            let mut from = vec![0.0; 3];
+            from[a] = last;
+            let found = axis_positions(&machine, tool_mm, Aim::PositionAndAxis, &wanted, &from).unwrap();
+            assert!((found[a] - wanted_angle).abs() < 1e-6, "{last}: {found:?}");
+        }
+    }
+}

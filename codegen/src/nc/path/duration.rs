@@ -74,6 +74,7 @@ mod tests {
     #[test]
     fn a_path_takes_its_length_over_its_feed() {
         assert!((minutes(Shape::Line(1000.0), &[[0.0, 0.0, 0.0], [-500.0, 0.0, 0.0]]) - 0.5).abs() < 1e-12);
+        assert!((minutes(Shape::Line(1000.0), &[[200.0, 50.0, 0.0], [-300.0, 0.0, 0.0]]) - 0.5).abs() < 1e-12);
         assert!((minutes(Shape::Line(90.0), &[[0.0, 0.0, 0.0], [0.0, 0.0, PI]]) - 2.0).abs() < 1e-12);
         let steps: Vec<[f64; 3]> = (0..=10).map(|k| [f64::from(k), 0.0, 0.0]).collect();
         assert!((minutes(Shape::Segments { seconds: 3.0, tool_points: None }, &steps) - 0.5).abs() < 1e-12);
