@@ -142,11 +142,19 @@ fn positions_of_steps_are_within_their_intervals() {
     }
     let outcomes = run(0..sessions(), with_steps);
     let [mut named, mut counted, mut matched, mut covered] = [Rate::default(); 4];
+    let mut of_errors = Pulls::default();
     for outcome in &outcomes {
         let Some(truth) = outcome.draw.truth.effects.first() else { continue };
         let Shape::Steps { at, .. } = &truth.shape else { continue };
         let hit = outcome.result.effects.iter().find(|effect| is(&effect.name, truth));
         named.count(hit.is_some());
+        if hit.is_some() {
+            let own = pulls(outcome, &outcome.result.after);
+            if verbose() {
+                println!("{} pulls {:.1?}", summary(outcome, "-"), own.0);
+            }
+            of_errors.0.extend(own.0);
+        }
         let Some(found) = hit.and_then(|effect| effect.shape_parameters.first()) else { continue };
         assert_eq!(found.values.len(), found.intervals_95.len(), "{}", summary(outcome, "-"));
         counted.count(found.values.len() == at.len());
@@ -169,6 +177,14 @@ fn positions_of_steps_are_within_their_intervals() {
     println!(
         "| steps at 5 times | |\n|---|---|\n| named first | {named} |\n| with the true number of steps | {counted} |\n\
          | true positions with a found one | {matched} |\n| of these, within its 95 % interval | {covered} |"
+    );
+    println!(
+        "| pulls of errors of the machine: rms; beyond 2, 3, 4 | {:.2}; {:.1}, {:.1}, {:.1} % of {} |",
+        of_errors.rms(),
+        100.0 * of_errors.beyond(2.0),
+        100.0 * of_errors.beyond(3.0),
+        100.0 * of_errors.beyond(4.0),
+        of_errors.0.len()
     );
     assert!(covered.is_consistent_with_at_least(0.85), "{covered}");
 }
