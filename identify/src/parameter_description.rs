@@ -64,7 +64,7 @@ pub(crate) fn coefficient_meaning(machine: &Machine, effect: &Effect, coefficien
     let effect = meaning(machine, effect);
     match coefficient {
         "" => effect.to_string(),
-        "amplitude" | "phase" | "rms" | "cos" | "sin" | "position" => format!("{effect}, {coefficient}"),
+        "amplitude" | "phase" | "rms" | "cos" | "sin" => format!("{effect}, {coefficient}"),
         number => format!("{effect}, coefficient {number}"),
     }
 }

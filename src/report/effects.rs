@@ -84,10 +84,11 @@ pub fn estimate(effect: &EffectResult) -> String {
         let value = quantity(&format!("{value} ± {u}"), &parameter.unit);
         format!("{coefficient}{separator} {value}").trim().to_string()
     });
-    // Estimated numbers are among the parameters.
+    // Estimated numbers are among the parameters, of several positions each with its number.
     let is_fixed = |number: &&ShapeParameter| {
         let name = if number.name == "time constant" { "tau" } else { &number.name };
-        !effect.parameters.iter().any(|parameter| parameter.id.ends_with(&format!(".{name}")))
+        let ends = [format!(".{name}"), format!(".{name}1")];
+        !effect.parameters.iter().any(|parameter| ends.iter().any(|end| parameter.id.ends_with(end)))
     };
     let numbers = effect.shape_parameters.iter().filter(is_fixed).map(shape_number);
     values.chain(numbers).collect::<Vec<_>>().join(", ")

@@ -110,24 +110,14 @@ pub fn with_symbols(sentence: &str) -> String {
     sentence.replace(" arcsec", "″").replace(" um", " µm")
 }
 
-/// A number or the positions of an effect's shape, to four digits: `period 13.78 mm`, `at -84.72, -40.72 mm`, with the
-/// intervals of the positions.
+/// A number or the positions of an effect's shape, to four digits: `period 13.78 mm`, `at -84.72, -40.72 mm`.
 pub fn shape_number(number: &ShapeParameter) -> String {
     let to_four_digits = |value: &f64| {
         let magnitude = value.abs().max(1e-3).log10().floor() as i32;
         format!("{value:.*}", (3 - magnitude).clamp(0, 4) as usize)
     };
     let values: Vec<String> = number.values.iter().map(to_four_digits).collect();
-    let interval = |ends: &Option<[f64; 2]>| match ends {
-        Some([low, high]) => format!("{} to {}", to_four_digits(low), to_four_digits(high)),
-        None => "not bounded".to_string(),
-    };
-    let intervals: Vec<String> = number.intervals_95.iter().map(interval).collect();
-    let intervals = match intervals.is_empty() {
-        true => String::new(),
-        false => format!(" (95 %: {})", intervals.join(", ")),
-    };
-    format!("{} {}{intervals}", number.name, quantity(&values.join(", "), &number.unit))
+    format!("{} {}", number.name, quantity(&values.join(", "), &number.unit))
 }
 
 /// Text with a minus sign in place of a hyphen before numbers.

@@ -47,7 +47,7 @@ pub struct StepPosition {
     pub effect: usize,
     /// Index among its positions.
     pub step: usize,
-    /// Standard uncertainty, internal unit of the driver.
+    /// Standard uncertainty, of the positions within the interval, internal unit of the driver.
     pub u: f64,
     /// The 95 % interval, internal unit of the driver; `None` if the readings do not bound the position.
     pub interval_95: Option<[f64; 2]>,
@@ -317,7 +317,11 @@ pub(super) fn at_solution(problem: &Problem, fit: &Fit) -> Result<Vec<StepPositi
         let ends = ends(&step, &profile).filter(|[first, last]| *first > 0 && last + 1 < profile.len());
         let interval = ends.map(|[first, last]| [step.levels[profile[first].gap - 1], step.levels[profile[last].gap]]);
         let weights = weights(&step, &profile, enlargement);
-        let variance: f64 = (profile.iter().zip(&weights))
+        // A standard uncertainty beside an interval that excludes far positions does not contain them either.
+        let [first, last] = ends.unwrap_or([0, profile.len() - 1]);
+        let inside = || profile.iter().zip(&weights).take(last + 1).skip(first);
+        let share: f64 = inside().map(|(_, (weight, _))| weight).sum();
+        let variance: f64 = inside()
             .map(|(moved, (weight, width))| weight * ((moved.at - step.at).powi(2) + width * width / 12.0))
             .sum();
         let others = profile
@@ -327,7 +331,7 @@ pub(super) fn at_solution(problem: &Problem, fit: &Fit) -> Result<Vec<StepPositi
         StepPosition {
             effect: step.effect,
             step: step.step,
-            u: variance.sqrt(),
+            u: (variance / share).sqrt(),
             interval_95: interval,
             others: others.map(|(moved, (weight, _))| (weight, moved.changes)).collect(),
         }
@@ -459,7 +463,8 @@ mod tests {
         for k in 0..2 {
             let mut total = 0.0;
             let mut squares = vec![0.0; found.beta.len()];
-            let mut spread = 0.0;
+            let (mut spread, mut within) = (0.0, 0.0);
+            let interval = found.positions[k].interval_95.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
             for pair in levels.windows(2) {
                 let mut moved = at;
                 moved[k] = 0.5 * (pair[0] + pair[1]);
@@ -470,14 +475,16 @@ mod tests {
                 assert!(sum > least - 2.0 * MIN_FALL, "{sum} {least} {moved:?}");
                 let weight = (pair[1] - pair[0]) * (-0.5 * (sum - least) / found.u_enlargement.powi(2)).exp();
                 total += weight;
-                spread += weight * ((moved[k] - at[k]).powi(2) + (pair[1] - pair[0]).powi(2) / 12.0);
+                if (interval[0]..=interval[1]).contains(&moved[k]) {
+                    within += weight;
+                    spread += weight * ((moved[k] - at[k]).powi(2) + (pair[1] - pair[0]).powi(2) / 12.0);
+                }
                 let off = |j: usize| weight * (beta[j] - found.beta[j]).powi(2);
                 squares.iter_mut().enumerate().for_each(|(j, square)| *square += off(j));
             }
             variances.iter_mut().zip(&squares).for_each(|(variance, square)| *variance += square / total);
             let u = found.positions[k].u;
-            // Far gaps, of which few are tried, contribute too.
-            assert!((u / (spread / total).sqrt() - 1.0).abs() < 0.25, "{u} {spread} {total}");
+            assert!((u / (spread / within).sqrt() - 1.0).abs() < 0.05, "{u} {spread} {within}");
         }
         let covered = contribution_beside_noise(&found, found.beta.len(), <[f64]>::to_vec);
         let mut compared = 0;
@@ -486,6 +493,7 @@ mod tests {
             if variance.sqrt() > 0.005 * of_noise {
                 compared += 1;
                 let share = covered[j] / variance.sqrt();
+                // Far gaps, of which few are tried, contribute too.
                 assert!((share - 1.0).abs() < 0.25, "{}: {share}", estimated.parameters.list[j].id);
             }
         }

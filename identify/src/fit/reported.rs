@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use abbe_model::effect::description::meaning;
+
 use super::outcome::{self, Determined};
 use super::quantities::{Quantity, quantities, rms_of_waves, u_of_undetermined_phase_deg};
 use super::{Fit, StepPosition, covariance, enlargement_warning};
@@ -12,7 +14,7 @@ use crate::heldout::cross_validation;
 use crate::heldout::{mislabelled_runs, rms_by_unit_mm, rms_mm};
 use crate::noise;
 use crate::numerics::rank::Rank;
-use crate::parameter_description::{coefficient_meaning, parameter_meaning};
+use crate::parameter_description::parameter_meaning;
 use crate::plausibility;
 use crate::positioning::{self, diagonal};
 use crate::problem::Problem;
@@ -144,7 +146,8 @@ fn position(problem: &Problem, position: &StepPosition) -> ParameterResult {
     let Unit { name, display_per_internal } = Unit::of_number(&problem.session, effect);
     let [value, u] = [effect.shape.positions()[step], u].map(|value| value * display_per_internal);
     let id = problem.parameters.position_id(number, step);
-    let meaning = coefficient_meaning(&problem.session.machine, effect, "position");
+    let which = if effect.shape.positions().len() > 1 { format!("position {}", step + 1) } else { "position".into() };
+    let meaning = format!("{}, {which}", meaning(&problem.session.machine, effect));
     let interval_95 = interval_95.map(|ends| ends.map(|end| end * display_per_internal));
     ParameterResult { interval_95, ..ParameterResult::new(&id, value, u, &name).with_meaning(meaning) }
 }

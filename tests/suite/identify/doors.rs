@@ -199,10 +199,15 @@ impl Walk {
         }
         let of_models = self.models.each_ref().map(|model| &model["covariance"]);
         let [first, second] = of_models.map(|rows| list(rows, name));
-        for (a, b) in first.iter().zip(second).flat_map(|(a, b)| list(a, name).iter().zip(list(b, name))) {
-            let (a, b) = (a.as_f64().unwrap(), b.as_f64().unwrap());
-            assert!((a - b).abs() <= 1e-5 * a.abs().max(b.abs()).max(1e-12), "{name}: {a} {b}");
+        // Each row ends at the diagonal.
+        let entry = |rows: &[Value], i: usize, j: usize| rows[i][j].as_f64().unwrap();
+        for (i, j) in (0..first.len()).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+            let (a, b) = (entry(first, i, j), entry(second, i, j));
+            // A correlation of 10⁻⁸ is rounding.
+            let of_rounding = 1e-8 * (entry(first, i, i) * entry(first, j, j)).sqrt();
+            assert!((a - b).abs() <= (1e-5 * a.abs().max(b.abs()).max(1e-12)).max(of_rounding), "{name}: {a} {b}");
         }
+        assert_eq!(first.len(), second.len());
         enlarged
     }
 
@@ -356,6 +361,29 @@ fn robot() {
     // Further effects would follow.
     assert_eq!(walk.verdict(), "partly-explained");
     assert_eq!(walk.fit["outcome"]["goodness"]["verdict"], "not-judged");
+}
+
+/// The position of a step is a parameter with an interval, which ends at readings, whichever door one asks at.
+#[test]
+fn positions_of_steps() {
+    let feature = "\n[[effect]]\ncomponent = \"EZC\"\nshape = \"steps\"\nat_deg = [81]\n";
+    let door = Door::of("hermle-c600u", "chapter5.toml", |text| text + feature);
+    let (plan, run) = (door.at("session.toml"), door.at("run"));
+    let height = "EZC~C:steps=3um";
+    let simulated =
+        abbe(&["simulate", text(&plan), "--out", text(&run), "--effect", height, "--hide-effects", "--quiet"]);
+    assert!(simulated.status.success(), "{}", String::from_utf8_lossy(&simulated.stderr));
+    for file in files_below(&run) {
+        fs::copy(&file, door.at(file.file_name().unwrap().to_str().unwrap())).unwrap();
+    }
+    let walk = door.walk(&["EZC~C:steps", "EZC~C:c"]);
+    walk.agrees("positions of steps");
+    let written = fs::read_to_string(door.at("next.toml")).unwrap();
+    assert!(written.contains("estimate = [\"at\"]"), "{written}");
+    // Readings are half a degree apart, and a reading at the position is beyond the step.
+    let position = list(&walk.fit["parameters"], "fit").iter().find(|own| own["id"] == "EZC~C:steps.at").unwrap();
+    assert_eq!(position["interval_95"], serde_json::json!([80.5, 81.0]), "{position}");
+    assert!((position["u"].as_f64().unwrap() - 0.5 / 12_f64.sqrt()).abs() < 0.01, "{position}");
 }
 
 /// The centre and the width of a local feature are parameters with an uncertainty, whichever door one asks at.
