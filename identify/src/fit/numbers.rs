@@ -21,6 +21,7 @@ use abbe_model::session::Prior;
 
 use super::{Fit, fit, minimum, positions};
 use crate::error::IdentifyError;
+use crate::numerics::tails::QUANTILE_95;
 use crate::parameters::Role;
 use crate::problem::Problem;
 
@@ -36,8 +37,6 @@ const TOLERANCE: f64 = 1e-7;
 const ROUNDING: f64 = 1e-12;
 /// Rise of χ² at two standard uncertainties, if it is parabolic: 4. Between these limits it counts as that.
 const PARABOLIC: [f64; 2] = [3.0, 5.3];
-/// The 95 % quantile of χ² with one degree of freedom.
-pub(super) const QUANTILE_95: f64 = 3.841_458_820_694_124;
 /// Steps of the search for an end of an interval.
 const MAX_STEPS: usize = 24;
 /// Relative accuracy of the rise of χ² at an end.

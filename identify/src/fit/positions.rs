@@ -19,10 +19,10 @@
 use abbe_model::effect::Effect;
 use faer::Mat;
 
-use super::numbers::QUANTILE_95;
 use super::{Fit, Problem};
 use crate::error::IdentifyError;
 use crate::numerics::solve::Svd;
+use crate::numerics::tails::QUANTILE_95;
 use crate::parameters::Role;
 
 /// Share of a column that remains after the projection below which the model contains it.
@@ -373,8 +373,7 @@ mod tests {
     use rand_pcg::Pcg64;
 
     use super::*;
-    use crate::fit::numbers::fit_with_numbers;
-    use crate::fit::{contribution_beside_noise, fit, prepare};
+    use crate::fit::{contribution_beside_noise, fit, prepare, refit};
 
     /// True positions, rad, and heights, mm, of steps that are added to measured readings.
     const AT: [f64; 2] = [1.3, 3.6];
@@ -453,10 +452,10 @@ mod tests {
     fn steps_move_to_the_best_gaps_and_uncertainties_cover_the_others() {
         let problem = problem();
         let mut estimated = with_steps(&problem, [AT[0] + 0.4, AT[1] - 0.5]);
-        let found = fit_with_numbers(&mut estimated, None).unwrap();
+        let first = fit(&estimated, None).unwrap();
+        let found = refit(&mut estimated, &first).unwrap();
         let at = positions(&estimated);
         assert!((at[0] - AT[0]).abs() < 0.2 && (at[1] - AT[1]).abs() < 0.2, "{at:?}");
-        let found = Fit { positions: at_solution(&estimated, &found).unwrap(), ..found };
         let levels = estimated.levels(estimated.parameters.effects.last().unwrap()).unwrap();
         let least = estimated.sum_of_squares(&found.beta);
         let mut variances = vec![0.0; found.beta.len()];

@@ -24,6 +24,9 @@ pub fn residual_tail(x: f64, freedom: f64, freedom_of_noise: Option<usize>) -> f
     }
 }
 
+/// The 95 % quantile of χ² with one degree of freedom.
+pub const QUANTILE_95: f64 = 3.841_458_820_694_124;
+
 /// The value that χ² exceeds with a probability; 0 for no degrees of freedom.
 pub fn chi_square_quantile(probability: f64, freedom: f64) -> f64 {
     ChiSquared::new(freedom).map_or(0.0, |law| law.inverse_cdf(1.0 - probability))
