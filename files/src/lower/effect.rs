@@ -49,6 +49,12 @@ pub(super) fn effect(
     let mut estimated = estimated(&effect.shape, names).within("estimate")?;
     let numbers = effect.shape.number_names().len();
     let positions_estimated = estimated.pop_if(|which| *which >= numbers).is_some();
+    let (positions, most) = (effect.shape.positions().len(), document::MAX_ESTIMATED_POSITIONS);
+    if positions_estimated && positions > most {
+        let help = "state fewer positions, or remove \"at\": they then stay where they are stated";
+        return Err(Fault::of_key(format!("{positions} positions are to be estimated, at most {most} can be"), help))
+            .within("estimate");
+    }
     Ok(Effect { aliases, assumed, estimated, positions_estimated, ..effect })
 }
 

@@ -44,6 +44,27 @@ fn errors_of_missing_axes() {
 }
 
 #[test]
+fn numbers_and_positions_to_estimate() {
+    let effect = |text: &str| session(MACHINE, &format!("{SESSION}\n[[effect]]\n{text}\n"), Some(DATA));
+    let steps = |count: usize, estimate: &str| {
+        let at: Vec<String> = (0..count).map(|k| format!("{}", k as f64 + 0.5)).collect();
+        let at = at.join(", ");
+        effect(&format!("component = \"EZC\"\nshape = \"steps\"\nat_deg = [{at}]\nestimate = [{estimate}]"))
+    };
+    let read = steps(40, "\"at\"").unwrap();
+    assert!(read.effects[0].positions_estimated && read.effects[0].estimated.is_empty());
+    assert!(!steps(41, "").unwrap().effects[0].positions_estimated);
+    assert_contains(
+        &error_text(steps(41, "\"at\"")),
+        &["session.toml:19", "41 positions", "at most 40", "state fewer"],
+    );
+    assert_contains(&error_text(steps(1, "\"at\", \"at\"")), &["session.toml:19", "\"at\" stands twice"]);
+    assert_contains(&error_text(steps(1, "\"width\"")), &["not a number of the shape \"steps\"", "known: at"]);
+    let harmonic = effect("component = \"EZC\"\nshape = \"harmonic\"\norder = 2\nestimate = [\"at\"]");
+    assert_contains(&error_text(harmonic), &["not a number of the shape \"harmonic\"", "remove `estimate`"]);
+}
+
+#[test]
 fn effects_on_missing_components() {
     let effect = |text: &str| error_text(session(MACHINE, &format!("{SESSION}\n[[effect]]\n{text}\n"), Some(DATA)));
     assert_contains(

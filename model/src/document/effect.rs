@@ -20,6 +20,9 @@ pub fn internal(unit: InternalUnit) -> f64 {
 /// The word in `estimate` for the positions of a shape: the key of steps.
 pub const POSITIONS: &str = "at";
 
+/// Largest number of positions of an effect that a fit estimates. It tries each in dozens of gaps between readings.
+pub const MAX_ESTIMATED_POSITIONS: usize = 40;
+
 /// An effect that the user declares.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename = "effect")]
