@@ -146,7 +146,16 @@ pub fn tolerance(u: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
+    use abbe_files::ReadOptions;
+    use abbe_model::driver::Driver;
+    use abbe_model::effect::shape::Harmonic;
+    use abbe_model::effect::{Component, Effect, Shape};
+
     use super::*;
+    use crate::fit::{AliasChange, EffectAliases};
+    use crate::parameters::Role;
 
     const FACTOR: f64 = 1.959_964;
 
@@ -187,5 +196,38 @@ mod tests {
             let found = verdict(off, runs);
             assert_eq!(found.verdict, wanted, "{off} after {runs}: {found:?}");
         }
+    }
+
+    /// Draws from the noise know nothing of an alias. What a parameter has to cover for it stays in its uncertainty.
+    #[test]
+    fn a_monte_carlo_covers_what_the_law_of_propagation_covers() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let (problem, _) = fit::prepare(&abbe_files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
+        let mut problem = problem;
+        let shape = Shape::Harmonic(Harmonic { order: 2.0 });
+        problem.add_effect(&Effect::new(Component::parse("EZC").unwrap(), Driver::parse("C"), shape)).unwrap();
+        let mut fit = fit::fit(&problem, None).unwrap();
+        // An alias that changes every location error by twice its uncertainty from the noise.
+        let is_location = |j: usize| problem.parameters.list[j].role == Role::Error;
+        let of_noise = |j: usize| fit.covariance[(j, j)].sqrt() * fit.u_enlargement;
+        let change = |j: usize| if is_location(j) { 2.0 * of_noise(j) } else { 0.0 };
+        let alias = AliasChange { alias: 0, changes: (0..fit.beta.len()).map(change).collect(), delta_chi2: 0.0 };
+        fit.aliases = vec![EffectAliases { effect: problem.parameters.effects.len() - 1, aliases: vec![alias] }];
+        let before = fit::report(&problem, &fit).unwrap();
+        let mut after = before.clone();
+        let draws = MonteCarlo { runs: 2000, seed: 1, coverage: 0.95 };
+        add_monte_carlo(&problem, &fit, &draws, &mut after).unwrap();
+        let drawn = &after.monte_carlo.as_ref().unwrap().parameters;
+        let mut covering = 0;
+        for ((before, after), drawn) in before.parameters.iter().zip(&after.parameters).zip(drawn) {
+            assert_eq!((&before.id, &after.id), (&drawn.id, &drawn.id));
+            // 2000 draws know a standard deviation to 1.6 %.
+            assert!((after.u / before.u - 1.0).abs() < 0.08, "{}: {} and {}", before.id, before.u, after.u);
+            let Some(without) = before.u_without_aliases else { continue };
+            covering += 1;
+            assert!((before.u / without - 5_f64.sqrt()).abs() < 1e-9, "{}", before.id);
+            assert!((drawn.gum_u / without - 1.0).abs() < 1e-12, "{}: {} and {without}", before.id, drawn.gum_u);
+        }
+        assert_eq!(covering, problem.parameters.list.iter().filter(|parameter| parameter.role == Role::Error).count());
     }
 }
