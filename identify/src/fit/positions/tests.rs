@@ -1,0 +1,136 @@
+use std::path::Path;
+use std::sync::Arc;
+
+use abbe_files::ReadOptions;
+use abbe_model::driver::Driver;
+use abbe_model::effect::shape::Steps;
+use abbe_model::effect::{Component, Shape};
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+
+use super::*;
+use crate::fit::{contribution_beside_noise, fit, prepare, refit};
+
+/// True positions, rad, and heights, mm, of steps that are added to measured readings.
+const AT: [f64; 2] = [1.3, 3.6];
+const HEIGHTS_MM: [f64; 2] = [2.2e-4, -3.5e-4];
+
+fn with_steps(problem: &Problem, at: [f64; 2]) -> Problem {
+    let mut problem = problem.clone();
+    let shape = Shape::Steps(Steps { at: at.to_vec() });
+    let effect = Effect::new(Component::parse("EZC").unwrap(), Driver::parse("C"), shape);
+    problem.add_effect(&effect.with_estimated_numbers()).unwrap();
+    problem
+}
+
+/// The problem of a measured session without steps, with the readings of a model with steps and noise.
+fn problem() -> Problem {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+    let (mut problem, _) = prepare(&abbe_files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
+    let truth = with_steps(&problem, AT);
+    let mut beta = vec![0.0; truth.parameters.list.len()];
+    let count = beta.len();
+    beta[count - 2..].copy_from_slice(&HEIGHTS_MM);
+    let mut random = Pcg64::new(1, 2);
+    for (test, residuals) in problem.tests.iter_mut().zip(truth.residuals(&beta)) {
+        let readings = Arc::make_mut(test.readings.as_mut().unwrap());
+        for (observed, residual) in readings.observed.iter_mut().zip(residuals) {
+            let noise: f64 = StandardNormal.sample(&mut random);
+            *observed += problem.noise.sigma_mm * noise - residual;
+        }
+    }
+    problem
+}
+
+/// The positions of a problem's steps, which are its last effect.
+fn positions(problem: &Problem) -> [f64; 2] {
+    problem.parameters.effects.last().unwrap().shape.positions().try_into().unwrap()
+}
+
+/// χ² and the parameters of a full fit with the steps at two positions.
+fn fitted(problem: &Problem, at: [f64; 2]) -> (f64, Vec<f64>) {
+    let moved = with_steps(problem, at);
+    let beta = fit(&moved, None).unwrap().beta;
+    (moved.sum_of_squares(&beta), beta)
+}
+
+/// Full fits with a step inside and outside of an end of its interval: χ² has risen by less and by more than the
+/// quantile. The intervals contain the true positions.
+#[test]
+fn an_interval_ends_where_full_fits_have_risen_by_the_quantile() {
+    let problem = problem();
+    let declared = with_steps(&problem, AT);
+    let found = fit(&declared, None).unwrap();
+    let allowed = QUANTILE_95 * found.u_enlargement.powi(2);
+    let (least, _) = fitted(&problem, AT);
+    let estimated = at_solution(&declared, &found).unwrap();
+    assert_eq!(estimated.len(), 2);
+    for (k, position) in estimated.iter().enumerate() {
+        let [low, high] = position.interval_95.unwrap();
+        assert!(low < AT[k] && AT[k] < high && high - low < 1.0, "{low} {high}");
+        let share = position.u / (high - low);
+        assert!(share > 0.1 && share < 0.8, "{share} of {low} {high}");
+        for end in [low, high] {
+            let rise = |share: f64| {
+                let mut at = AT;
+                at[k] += share * (end - AT[k]);
+                fitted(&problem, at).0 - least
+            };
+            let [inside, outside] = [0.998, 1.002].map(rise);
+            assert!(inside < allowed && outside > allowed, "{inside} {allowed} {outside} at {end}");
+        }
+    }
+}
+
+/// No other gap between readings has a lower χ², by full fits for each of them; and the contribution to uncertainties is
+/// that of these fits with their weights.
+#[test]
+fn steps_move_to_the_best_gaps_and_uncertainties_cover_the_others() {
+    let problem = problem();
+    let mut estimated = with_steps(&problem, [AT[0] + 0.4, AT[1] - 0.5]);
+    let first = fit(&estimated, None).unwrap();
+    let found = refit(&mut estimated, &first).unwrap();
+    let at = positions(&estimated);
+    assert!((at[0] - AT[0]).abs() < 0.2 && (at[1] - AT[1]).abs() < 0.2, "{at:?}");
+    let levels = estimated.levels(estimated.parameters.effects.last().unwrap()).unwrap();
+    let least = estimated.sum_of_squares(&found.beta);
+    let mut variances = vec![0.0; found.beta.len()];
+    for k in 0..2 {
+        let mut total = 0.0;
+        let mut squares = vec![0.0; found.beta.len()];
+        let (mut spread, mut within) = (0.0, 0.0);
+        let interval = found.positions[k].interval_95.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        for pair in levels.windows(2) {
+            let mut moved = at;
+            moved[k] = 0.5 * (pair[0] + pair[1]);
+            if (moved[k] - at[1 - k]).abs() < pair[1] - pair[0] || (moved[0] < moved[1]) != (at[0] < at[1]) {
+                continue;
+            }
+            let (sum, beta) = fitted(&problem, moved);
+            assert!(sum > least - 2.0 * MIN_FALL, "{sum} {least} {moved:?}");
+            let weight = (pair[1] - pair[0]) * (-0.5 * (sum - least) / found.u_enlargement.powi(2)).exp();
+            total += weight;
+            if (interval[0]..=interval[1]).contains(&moved[k]) {
+                within += weight;
+                spread += weight * ((moved[k] - at[k]).powi(2) + (pair[1] - pair[0]).powi(2) / 12.0);
+            }
+            let off = |j: usize| weight * (beta[j] - found.beta[j]).powi(2);
+            squares.iter_mut().enumerate().for_each(|(j, square)| *square += off(j));
+        }
+        variances.iter_mut().zip(&squares).for_each(|(variance, square)| *variance += square / total);
+        let u = found.positions[k].u;
+        assert!((u / (spread / within).sqrt() - 1.0).abs() < 0.05, "{u} {spread} {within}");
+    }
+    let covered = contribution_beside_noise(&found, found.beta.len(), <[f64]>::to_vec);
+    let mut compared = 0;
+    for (j, variance) in variances.iter().enumerate() {
+        let of_noise = found.covariance[(j, j)].sqrt() * found.u_enlargement;
+        if variance.sqrt() > 0.005 * of_noise {
+            compared += 1;
+            let share = covered[j] / variance.sqrt();
+            // Far gaps, of which few are tried, contribute too.
+            assert!((share - 1.0).abs() < 0.25, "{}: {share}", estimated.parameters.list[j].id);
+        }
+    }
+    assert!(compared >= 3, "{compared}");
+}
