@@ -488,9 +488,8 @@ mod tests {
         assert_eq!(text, format!("{expected}{}", &SESSION[SESSION.find("[instrument]").unwrap()..]));
     }
 
-    /// Tests in a line are left out as those in tables are.
     #[test]
-    fn tests_are_left_out_in_either_form() {
+    fn tests_are_left_out_of_a_line_as_of_tables() {
         let inline = "test = [{ name = \"A\" }, { name = \"B\" }]\n";
         let tables = "[[test]]\nname = \"A\"\n[[test]]\nname = \"B\"\n";
         for text in [inline, tables] {
