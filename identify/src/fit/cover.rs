@@ -1,7 +1,7 @@
-//! What uncertainties cover beside the noise: the aliases of effects, and the estimated positions of steps.
+//! What uncertainties cover beside the noise: the aliases of effects, the estimated positions of steps, and a further step.
 //!
-//! For each effect they cover the largest change `δ` by one of its aliases; for each step the positions `p` in which it may
-//! lie, by their weights:
+//! For each effect they cover the largest change `δ` by one of its aliases; for each step the positions `p` in which it, or a
+//! further one, may lie, by their weights:
 //!
 //! ```text
 //! u² = u₀² + Σ_effects max_aliases δ² + Σ_steps Σ_p w(p) δ(p)²
@@ -33,10 +33,10 @@ fn shifts(fit: &Fit, values: &impl Fn(&[f64]) -> Vec<f64>) -> Vec<Vec<Vec<f64>>>
     fit.aliases.iter().map(|effect| effect.aliases.iter().map(of_alias).collect()).collect()
 }
 
-/// The changes of some functions of the parameters by each other position of a step, with its weight.
+/// The changes of some functions of the parameters by each other position of a step and by a further step, with its weight.
 fn shifts_of_positions(fit: &Fit, values: &impl Fn(&[f64]) -> Vec<f64>) -> impl Iterator<Item = (f64, Vec<f64>)> {
     let others = fit.positions.iter().flat_map(|position| &position.others);
-    others.map(|(weight, changes)| (*weight, shift(fit, changes, values)))
+    others.chain(&fit.further_steps).map(|(weight, changes)| (*weight, shift(fit, changes, values)))
 }
 
 /// The variance of some functions of the parameters by the positions of steps.

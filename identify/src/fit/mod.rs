@@ -11,6 +11,7 @@ pub mod base;
 mod covariance;
 mod cover;
 pub mod families;
+mod further_steps;
 pub(crate) mod numbers;
 pub mod outcome;
 mod positions;
@@ -76,6 +77,8 @@ pub struct Fit {
     pub intervals: Vec<NumberInterval>,
     /// The estimated positions of steps.
     pub positions: Vec<StepPosition>,
+    /// What steps beside the estimated ones may change: the change of each parameter, internal units, with its weight.
+    pub further_steps: Vec<(f64, Vec<f64>)>,
 }
 
 /// Significance level of the χ² test of the residual against the noise.
@@ -212,6 +215,7 @@ fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, IdentifyError> {
         aliases,
         intervals: Vec::new(),
         positions: Vec::new(),
+        further_steps: Vec::new(),
     };
     if fit.exceeds_noise() {
         // The inflation of the likelihood enlarges the uncertainties already.

@@ -79,6 +79,57 @@ struct Moved {
     changes: Vec<f64>,
 }
 
+/// Some columns of a triangular factor, for what they explain of another column.
+pub(super) struct Projection {
+    columns: Vec<usize>,
+    svd: Svd,
+    rank: usize,
+}
+
+impl Projection {
+    /// Of the columns of these numbers, for parameters of these sizes.
+    pub fn of(r: &Mat<f64>, sizes: &[f64], columns: Vec<usize>) -> Result<Projection, IdentifyError> {
+        let scaled = Mat::from_fn(r.nrows(), columns.len(), |i, k| r[(i, columns[k])] * sizes[columns[k]]);
+        let svd = Svd::of(scaled.as_ref())?;
+        let rank = svd.identifiable_rank();
+        Ok(Projection { columns, svd, rank })
+    }
+
+    /// A column as its coordinates in the directions of the columns, and the rest.
+    pub fn split(&self, column: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let mut rest = column.to_vec();
+        let along: Vec<f64> = (0..self.rank)
+            .map(|k| {
+                let direction = self.svd.left().col(k);
+                let along: f64 = direction.iter().zip(column).map(|(u, c)| u * c).sum();
+                rest.iter_mut().zip(direction.iter()).for_each(|(rest, u)| *rest -= along * u);
+                along
+            })
+            .collect();
+        (along, rest)
+    }
+
+    /// The square of the rest of a column; `None` if the columns contain it.
+    pub fn information(column: &[f64], rest: &[f64]) -> Option<f64> {
+        let square = dot(rest, rest);
+        (square > CONTAINED * dot(column, column)).then_some(square)
+    }
+
+    /// Adds the parameters of the columns with these coordinates, internal units.
+    pub fn add(&self, along: &[f64], sizes: &[f64], changes: &mut [f64]) {
+        for (direction, along) in along.iter().enumerate() {
+            let by = along / self.svd.singular_values[direction];
+            for (j, v) in self.columns.iter().zip(self.svd.right().col(direction).iter()) {
+                changes[*j] += by * v * sizes[*j];
+            }
+        }
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
 impl Step<'_> {
     /// A position in a gap: its own, or the middle.
     fn at(&self, gap: usize) -> f64 {
@@ -163,47 +214,26 @@ fn profiles(
     at.resize(wide.parameters.list.len(), 0.0);
     let (r, c, beside) = wide.prior_triangle(&at).merged(&wide.triangles(&at)?).parts();
     let sizes = wide.parameters.sizes();
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let mut found = Vec::with_capacity(steps.len());
     for ((step, gaps), first) in steps.iter().zip(gaps).zip(firsts) {
         if gaps.is_empty() {
             found.push(Vec::new());
             continue;
         }
-        let others: Vec<usize> = (0..count).filter(|j| *j != step.height).collect();
-        let scaled = Mat::from_fn(r.nrows(), others.len(), |i, k| r[(i, others[k])] * sizes[others[k]]);
-        let svd = Svd::of(scaled.as_ref())?;
-        let rank = svd.identifiable_rank();
-        // A column as its coordinates in the directions of the others, and the rest.
-        let split = |column: &[f64]| {
-            let mut rest = column.to_vec();
-            let along: Vec<f64> = (0..rank)
-                .map(|k| {
-                    let direction = svd.left().col(k);
-                    let along: f64 = direction.iter().zip(column).map(|(u, c)| u * c).sum();
-                    rest.iter_mut().zip(direction.iter()).for_each(|(rest, u)| *rest -= along * u);
-                    along
-                })
-                .collect();
-            (along, rest)
-        };
+        let others = (0..count).filter(|j| *j != step.height).collect();
+        let others = Projection::of(&r, &sizes, others)?;
         let readings: Vec<f64> = (0..r.nrows()).map(|i| c[i] + r[(i, step.height)] * beta[step.height]).collect();
-        let (along, rest) = split(&readings);
+        let (along, rest) = others.split(&readings);
         let moved = |(k, gap): (usize, &usize)| {
             let column: Vec<f64> = (0..r.nrows()).map(|i| r[(i, first + k)] * sizes[first + k]).collect();
-            let (along_column, rest_of_column) = split(&column);
-            let square = dot(&rest_of_column, &rest_of_column);
-            let is_contained = square <= CONTAINED * dot(&column, &column);
-            let height = if is_contained { 0.0 } else { dot(&rest_of_column, &rest) / square };
+            let (along_column, rest_of_column) = others.split(&column);
+            let information = Projection::information(&column, &rest_of_column);
+            let height = information.map_or(0.0, |information| dot(&rest_of_column, &rest) / information);
             let mut changes = vec![0.0; count];
             changes[step.height] = height * sizes[first + k] - beta[step.height];
-            for direction in 0..rank {
-                let by = (along[direction] - height * along_column[direction]) / svd.singular_values[direction];
-                for (j, v) in others.iter().zip(svd.right().col(direction).iter()) {
-                    changes[*j] += by * v * sizes[*j];
-                }
-            }
-            let chi_square = beside + dot(&rest, &rest) - height * height * square;
+            let along: Vec<f64> = along.iter().zip(&along_column).map(|(y, column)| y - height * column).collect();
+            others.add(&along, &sizes, &mut changes);
+            let chi_square = beside + dot(&rest, &rest) - height * height * information.unwrap_or(0.0);
             Moved { gap: *gap, at: step.at(*gap), chi_square, changes }
         };
         found.push(gaps.iter().enumerate().map(moved).collect());

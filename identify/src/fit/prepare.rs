@@ -9,7 +9,7 @@ use faer::Mat;
 
 use super::families::{FoldEquations, families};
 use super::numbers::{fit_with_numbers, intervals};
-use super::{Fit, positions};
+use super::{Fit, further_steps, positions};
 use crate::error::IdentifyError;
 use crate::heldout::{rms_by_unit_mm, rms_mm};
 use crate::noise::outliers;
@@ -46,6 +46,7 @@ pub fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> Result<
     let (problem, mut fit) = prepare_at_noise(session, effects, seed)?;
     fit.intervals = intervals(&problem, &fit)?;
     fit.positions = positions::at_solution(&problem, &fit)?;
+    fit.further_steps = further_steps::at_solution(&problem, &fit)?;
     Ok((problem, fit))
 }
 
@@ -57,6 +58,7 @@ pub fn refit(problem: &mut Problem, present: &Fit) -> Result<Fit, IdentifyError>
     let mut fit = fit_with_numbers(problem, Some(&present.beta))?;
     fit.intervals = intervals(problem, &fit)?;
     fit.positions = positions::at_solution(problem, &fit)?;
+    fit.further_steps = further_steps::at_solution(problem, &fit)?;
     Ok(fit)
 }
 

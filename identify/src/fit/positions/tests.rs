@@ -15,7 +15,7 @@ use crate::fit::{contribution_beside_noise, fit, prepare, refit};
 const AT: [f64; 2] = [1.3, 3.6];
 const HEIGHTS_MM: [f64; 2] = [2.2e-4, -3.5e-4];
 
-fn with_steps(problem: &Problem, at: [f64; 2]) -> Problem {
+fn with_steps(problem: &Problem, at: &[f64]) -> Problem {
     let mut problem = problem.clone();
     let shape = Shape::Steps(Steps { at: at.to_vec() });
     let effect = Effect::new(Component::parse("EZC").unwrap(), Driver::parse("C"), shape);
@@ -27,7 +27,7 @@ fn with_steps(problem: &Problem, at: [f64; 2]) -> Problem {
 fn problem() -> Problem {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
     let (mut problem, _) = prepare(&abbe_files::session(&file, &ReadOptions::default()).unwrap(), 1).unwrap();
-    let truth = with_steps(&problem, AT);
+    let truth = with_steps(&problem, &AT);
     let mut beta = vec![0.0; truth.parameters.list.len()];
     let count = beta.len();
     beta[count - 2..].copy_from_slice(&HEIGHTS_MM);
@@ -48,7 +48,7 @@ fn positions(problem: &Problem) -> [f64; 2] {
 }
 
 /// χ² and the parameters of a full fit with the steps at two positions.
-fn fitted(problem: &Problem, at: [f64; 2]) -> (f64, Vec<f64>) {
+fn fitted(problem: &Problem, at: &[f64]) -> (f64, Vec<f64>) {
     let moved = with_steps(problem, at);
     let beta = fit(&moved, None).unwrap().beta;
     (moved.sum_of_squares(&beta), beta)
@@ -59,10 +59,10 @@ fn fitted(problem: &Problem, at: [f64; 2]) -> (f64, Vec<f64>) {
 #[test]
 fn an_interval_ends_where_full_fits_have_risen_by_the_quantile() {
     let problem = problem();
-    let declared = with_steps(&problem, AT);
+    let declared = with_steps(&problem, &AT);
     let found = fit(&declared, None).unwrap();
     let allowed = QUANTILE_95 * found.u_enlargement.powi(2);
-    let (least, _) = fitted(&problem, AT);
+    let (least, _) = fitted(&problem, &AT);
     let estimated = at_solution(&declared, &found).unwrap();
     assert_eq!(estimated.len(), 2);
     for (k, position) in estimated.iter().enumerate() {
@@ -74,7 +74,7 @@ fn an_interval_ends_where_full_fits_have_risen_by_the_quantile() {
             let rise = |share: f64| {
                 let mut at = AT;
                 at[k] += share * (end - AT[k]);
-                fitted(&problem, at).0 - least
+                fitted(&problem, &at).0 - least
             };
             let [inside, outside] = [0.998, 1.002].map(rise);
             assert!(inside < allowed && outside > allowed, "{inside} {allowed} {outside} at {end}");
@@ -87,9 +87,10 @@ fn an_interval_ends_where_full_fits_have_risen_by_the_quantile() {
 #[test]
 fn steps_move_to_the_best_gaps_and_uncertainties_cover_the_others() {
     let problem = problem();
-    let mut estimated = with_steps(&problem, [AT[0] + 0.4, AT[1] - 0.5]);
+    let mut estimated = with_steps(&problem, &[AT[0] + 0.4, AT[1] - 0.5]);
     let first = fit(&estimated, None).unwrap();
-    let found = refit(&mut estimated, &first).unwrap();
+    let mut found = refit(&mut estimated, &first).unwrap();
+    found.further_steps.clear();
     let at = positions(&estimated);
     assert!((at[0] - AT[0]).abs() < 0.2 && (at[1] - AT[1]).abs() < 0.2, "{at:?}");
     let levels = estimated.levels(estimated.parameters.effects.last().unwrap()).unwrap();
@@ -106,7 +107,7 @@ fn steps_move_to_the_best_gaps_and_uncertainties_cover_the_others() {
             if (moved[k] - at[1 - k]).abs() < pair[1] - pair[0] || (moved[0] < moved[1]) != (at[0] < at[1]) {
                 continue;
             }
-            let (sum, beta) = fitted(&problem, moved);
+            let (sum, beta) = fitted(&problem, &moved);
             assert!(sum > least - 2.0 * MIN_FALL, "{sum} {least} {moved:?}");
             let weight = (pair[1] - pair[0]) * (-0.5 * (sum - least) / found.u_enlargement.powi(2)).exp();
             total += weight;
@@ -130,6 +131,60 @@ fn steps_move_to_the_best_gaps_and_uncertainties_cover_the_others() {
             let share = covered[j] / variance.sqrt();
             // Far gaps, of which few are tried, contribute too.
             assert!((share - 1.0).abs() < 0.25, "{}: {share}", estimated.parameters.list[j].id);
+        }
+    }
+    assert!(compared >= 3, "{compared}");
+}
+
+/// The contribution of a further step is that of full fits with a step at each place: the integral over its height of its
+/// prior, which is that of the found heights, times the likelihood. It counts one in two that there is one.
+#[test]
+fn uncertainties_cover_a_further_step() {
+    let problem = problem();
+    let mut estimated = with_steps(&problem, &AT);
+    let first = fit(&estimated, None).unwrap();
+    let mut found = refit(&mut estimated, &first).unwrap();
+    let at = positions(&estimated);
+    let heights = found.beta.len() - 2..found.beta.len();
+    let prior = heights.map(|j| found.beta[j] * found.beta[j]).sum::<f64>() / 2.0;
+    let levels = estimated.levels(estimated.parameters.effects.last().unwrap()).unwrap();
+    let (low, high) = (levels[0], levels[levels.len() - 1]);
+    let is_found = |place: f64| {
+        let within = |k: usize| found.positions[k].interval_95.is_some_and(|[a, b]| (a..=b).contains(&place));
+        let between = |k: usize| levels.iter().filter(|level| (**level < at[k]) != (**level < place)).count();
+        (0..2).any(|k| within(k) || between(k) <= 1)
+    };
+    let (mut total, mut places) = (0.0, 0.0);
+    let mut squares = vec![0.0; found.beta.len()];
+    for place in (1..64).map(|k| low + (high - low) * f64::from(k) / 64.0).filter(|place| !is_found(*place)) {
+        let three = with_steps(&problem, &[at[0], at[1], place]);
+        let with = fit(&three, None).unwrap();
+        let last = with.beta.len() - 1;
+        let (height, variance) = (with.beta[last], with.covariance[(last, last)] * found.u_enlargement.powi(2));
+        // Trapezoidal sums over the height.
+        let width = 20.0 * (prior.sqrt() + variance.sqrt()) / 4000.0;
+        let (mut factor, mut mean_square) = (0.0, 0.0);
+        for k in -2000..=2000 {
+            let h = f64::from(k) * width;
+            let likelihood = (0.5 * (height * height - (h - height).powi(2)) / variance).exp();
+            let density = (-0.5 * h * h / prior).exp() / (2.0 * std::f64::consts::PI * prior).sqrt();
+            factor += likelihood * density * width;
+            mean_square += h * h * likelihood * density * width;
+        }
+        places += 1.0;
+        total += factor;
+        let by_height = |j: usize| (with.beta[j] - found.beta[j]) / height;
+        squares.iter_mut().enumerate().for_each(|(j, square)| *square += mean_square * by_height(j).powi(2));
+    }
+    found.positions.clear();
+    let covered = contribution_beside_noise(&found, found.beta.len(), <[f64]>::to_vec);
+    let mut compared = 0;
+    for (j, square) in squares.iter().enumerate() {
+        let expected = (square / (places + total)).sqrt();
+        if expected > 0.01 * found.covariance[(j, j)].sqrt() * found.u_enlargement {
+            compared += 1;
+            let id = &estimated.parameters.list[j].id;
+            assert!((covered[j] / expected - 1.0).abs() < 0.02, "{id}: {} {expected}", covered[j]);
         }
     }
     assert!(compared >= 3, "{compared}");
