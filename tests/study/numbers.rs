@@ -141,7 +141,7 @@ fn positions_of_steps_are_within_their_intervals() {
         return;
     }
     let outcomes = run(0..sessions(), with_steps);
-    let [mut named, mut counted, mut matched, mut covered] = [Rate::default(); 4];
+    let [mut named, mut counted, mut surplus, mut matched, mut covered] = [Rate::default(); 5];
     let mut of_errors = Pulls::default();
     for outcome in &outcomes {
         let Some(truth) = outcome.draw.truth.effects.first() else { continue };
@@ -158,6 +158,13 @@ fn positions_of_steps_are_within_their_intervals() {
         let Some(found) = hit.and_then(|effect| effect.shape_parameters.first()) else { continue };
         assert_eq!(found.values.len(), found.intervals_95.len(), "{}", summary(outcome, "-"));
         counted.count(found.values.len() == at.len());
+        surplus.count(found.values.len() > at.len());
+        if verbose() {
+            let heights: Vec<String> = (hit.iter().flat_map(|effect| &effect.parameters))
+                .map(|parameter| format!("{:.2} ± {:.2}", parameter.value, parameter.u))
+                .collect();
+            println!("        {:?}, found {:.2?}: {}", truth.shape, found.values, heights.join(", "));
+        }
         let nearest = |places: &[f64], to: f64| {
             (0..places.len()).min_by(|a, b| (places[*a] - to).abs().total_cmp(&(places[*b] - to).abs()))
         };
@@ -176,6 +183,7 @@ fn positions_of_steps_are_within_their_intervals() {
     }
     println!(
         "| steps at 5 times | |\n|---|---|\n| named first | {named} |\n| with the true number of steps | {counted} |\n\
+         | with more steps | {surplus} |\n\
          | true positions with a found one | {matched} |\n| of these, within its 95 % interval | {covered} |"
     );
     println!(

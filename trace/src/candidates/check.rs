@@ -7,13 +7,16 @@ use std::sync::Arc;
 use abbe_files::ReadOptions;
 use abbe_identify::fit::prepare;
 use abbe_identify::problem::Problem;
+use abbe_model::effect::Effect;
 use faer::Mat;
 use faer::linalg::solvers::SolveLstsq;
 
+use super::candidate::Candidate;
 use super::columns::{Columns, EffectColumns};
 use super::gain::TrainedModel;
 use super::gram::{Given, Gram, PriorGram};
 use super::library;
+use super::step_table::best_step_table;
 use super::tuned::TunedChannel;
 
 /// The bundled session with some readings rejected and noise of a given autocorrelation.
@@ -264,4 +267,52 @@ fn gains_of_a_long_session_are_those_of_least_squares() {
         compared += 1;
     }
     assert!(compared >= 5, "{compared} of {}", sets.len());
+}
+
+/// A step between two positions of the grid, which the dictionary approximates by two, is one step; two steps stay two.
+#[test]
+fn steps_off_the_grid_are_as_many_as_there_are() {
+    let (problem, beta) = problem(&[]);
+    let columns = Columns::new(&problem, &beta);
+    let (model, _) = model(&columns, &beta);
+    let all = library::candidates(&problem).unwrap();
+    let is_own = |effect: &Effect| effect.component.to_string() == "EZC" && effect.driver.to_string() == "C";
+    let member =
+        all.iter().find(|m| m.dictionary && is_own(&m.effect) && !m.effect.shape.positions().is_empty()).unwrap();
+    let set = columns.effect_columns(&member.effect).unwrap();
+    let dictionary = Candidate::of(member.clone(), set.clone());
+    let at = member.effect.shape.positions().to_vec();
+    let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
+    let mut approximated = 0;
+    for (k, positions) in [(10, 1), (17, 1), (23, 1), (8, 2), (20, 2)] {
+        let true_at: Vec<f64> = [0, 14][..positions].iter().map(|more| at[k + more] + 0.5 * dictionary.grid).collect();
+        let effect = Effect { shape: member.effect.shape.with_positions(true_at.clone()), ..member.effect.clone() };
+        let own = rows(&columns, &[&columns.effect_columns(&effect).unwrap()]);
+        // Noise of variance 1, by the sum of twelve even numbers.
+        let mut bits = 1_u64 + k as u64;
+        let mut even = || {
+            bits = bits.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (bits >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let y = Mat::from_fn(columns.rows(), 1, |i, _| {
+            let steps: f64 = own.row(i).iter().zip([1.0, -1.0]).map(|(step, sign)| sign * step).sum();
+            40.0 * steps / own.col(0).norm_l2() + (0..12).map(|_| even()).sum::<f64>() - 6.0
+        });
+        let residual = &y - &model * (model.transpose() * &y);
+        let residual: Vec<f64> = residual.col(0).iter().copied().collect();
+        let rank = model.ncols();
+        let prior = PriorGram { base: Mat::zeros(rank, rank), base_y: vec![0.0; rank] };
+        let gram = Gram::new(&columns, vec![set.clone()], Arc::new(model.clone()), &residual, prior);
+        let trained = TrainedModel::new(&gram, &[], &folds).unwrap();
+        let table = best_step_table(&trained, 0, &dictionary, 1.0).unwrap().unwrap();
+        approximated += usize::from(table.effect.shape.positions().len() > positions);
+        let tuning = trained.tuning();
+        let table = table.with_best_positions(&TunedChannel::of(&columns, &tuning, &set), &dictionary, 1.0);
+        let found = table.effect.shape.positions();
+        assert_eq!(found.len(), positions, "{found:?}, true {true_at:?}");
+        for (found, true_at) in found.iter().zip(&true_at) {
+            assert!((found - true_at).abs() < dictionary.grid, "{found} {true_at} {}", dictionary.grid);
+        }
+    }
+    assert!(approximated >= 3, "{approximated}");
 }

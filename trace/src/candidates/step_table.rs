@@ -4,6 +4,9 @@
 //! exchange sweep follows each selection (best-subset selection by splicing: Zhu et al., PNAS 117 (2020) 33117). The
 //! evidence of `n` selected out of `m` positions is reduced by `ln C(m, n)`, the logarithm of the number of possible
 //! selections. By the union bound this penalty keeps the significance level of the search.
+//!
+//! Between two positions of the dictionary a step is approximated by two. Selected positions are therefore moved by
+//! fractions of the grid, and those that this makes superfluous are removed.
 
 use abbe_identify::error::IdentifyError;
 use abbe_identify::numerics::solve::solve_square;
@@ -15,11 +18,14 @@ use statrs::function::gamma::ln_gamma;
 
 use super::candidate::Candidate;
 use super::gain::{Projected, TrainedModel};
+use super::tuned::TunedChannel;
 
 /// Maximum number of positions of one effect. An effect with more positions is a curve.
 const MAX_POSITIONS: usize = 6;
 /// Maximum number of exchange sweeps after a selection.
 const MAX_SWEEPS: usize = 4;
+/// Places in an interval of the grid to which a position is moved.
+const MOVES: i32 = 4;
 
 /// An effect with several step positions.
 #[derive(Clone, Debug)]
@@ -40,6 +46,57 @@ impl StepTable {
     /// Evidence less cost: the criterion of comparison.
     pub fn score(&self) -> f64 {
         self.evidence - self.cost
+    }
+
+    /// The table with its positions moved for the largest joint gain, without those whose removal does not reduce the
+    /// evidence. One position that is left is a step of the library off its grid.
+    pub fn with_best_positions(self, channel: &TunedChannel<'_>, dictionary: &Candidate, variance: f64) -> StepTable {
+        let library = dictionary.effect.shape.positions().len();
+        let evidence_of = |positions: &[f64], gain: f64| {
+            let n = positions.len();
+            -ln_chi_square_tail(gain / variance, n) - selection_penalty(library, n)
+        };
+        let shape_at = |positions: Vec<f64>| self.effect.shape.with_positions(positions);
+        let moved = |mut positions: Vec<f64>| {
+            let mut present = channel.effect(&shape_at(positions.clone()));
+            let mut best = channel.gain(&present);
+            for _ in 0..2 {
+                for k in 0..positions.len() {
+                    let middle = positions[k];
+                    for part in 1 - MOVES..MOVES {
+                        let position = middle + dictionary.grid * f64::from(part) / f64::from(MOVES);
+                        let moved = channel.effect(&shape_at(vec![position]));
+                        let gain = channel.gain_with(&present, k, &moved);
+                        if gain > best * (1.0 + 1e-9) {
+                            best = gain;
+                            positions[k] = position;
+                            channel.exchange(&mut present, k, &moved);
+                        }
+                    }
+                }
+            }
+            let evidence = evidence_of(&positions, best);
+            (positions, evidence)
+        };
+        let (mut positions, mut evidence) = moved(self.effect.shape.positions().to_vec());
+        while positions.len() > 1 {
+            let without = |k: usize| {
+                let rest: Vec<f64> = (0..positions.len()).filter(|i| *i != k).map(|i| positions[i]).collect();
+                let gain = channel.gain(&channel.effect(&shape_at(rest.clone())));
+                (rest, gain)
+            };
+            let Some((rest, _)) = (0..positions.len()).map(without).max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
+            let (fewer, of_fewer) = moved(rest);
+            if of_fewer < evidence {
+                break;
+            }
+            (positions, evidence) = (fewer, of_fewer);
+        }
+        positions.sort_by(f64::total_cmp);
+        let selection_penalty = selection_penalty(library, positions.len());
+        let shape = shape_at(positions);
+        let effect = Effect { shape, ..self.effect };
+        StepTable { effect, selection_penalty, evidence, ..self }
     }
 }
 
@@ -72,7 +129,7 @@ pub fn best_step_table(
         if n < 2 {
             continue;
         }
-        let selection_penalty = ln_choices(at.len(), n);
+        let selection_penalty = selection_penalty(at.len(), n);
         let evidence = -ln_chi_square_tail(gain / variance, n) - selection_penalty;
         if best.as_ref().is_none_or(|best| evidence - dictionary.cost > best.score()) {
             let mut positions: Vec<f64> = chosen.iter().map(|k| at[*k]).collect();
@@ -84,6 +141,12 @@ pub fn best_step_table(
         }
     }
     Ok(best)
+}
+
+/// The penalty for `n` selected out of `m` positions. A single step is an effect of the library, whose number of effects
+/// counts its positions.
+fn selection_penalty(m: usize, n: usize) -> f64 {
+    if n > 1 { ln_choices(m, n) } else { 0.0 }
 }
 
 /// `ln C(m, n)`, the logarithm of the binomial coefficient.

@@ -103,14 +103,19 @@ impl SearchState<'_> {
         nearest.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
         nearest.truncate(most);
         let moved = |k: usize| {
-            let table = &nearest[k];
-            let (effect, gain) = self.with_best_positions(tuning, table);
-            let gain = Gain { gain, freedom: effect.shape.coefficients() + effect.shape.numbers() };
-            let evidence = self.evidence(&gain, variance);
+            let table = self.with_best_positions(tuning, nearest[k].clone(), variance);
+            let evidence = table.evidence + table.selection_penalty;
             let near = evidence >= best - MAX_EVIDENCE_DEFICIT || evidence - table.cost >= MIN_EVIDENCE_SHARE * best;
-            near.then(|| Tuned { effect, ..Tuned::of(table.clone()) })
+            near.then(|| Tuned::of(table))
         };
         Ok(parallel::map(nearest.len(), &moved).into_iter().flatten().collect())
+    }
+
+    /// A step table with its best positions.
+    fn with_best_positions(&self, tuning: &Tuning<'_>, table: StepTable, variance: f64) -> StepTable {
+        let dictionary = &self.candidates[table.dictionary];
+        let channel = TunedChannel::of(self.columns, tuning, &dictionary.columns);
+        table.with_best_positions(&channel, dictionary, variance)
     }
 
     /// Adds an effect with the shape numbers or positions that are best beside others. Returns its index: the effect
@@ -123,7 +128,9 @@ impl SearchState<'_> {
     ) -> Result<Option<usize>, IdentifyError> {
         let model = self.model_of(beside, folds)?;
         let fresh = if !self.effect(tunable).shape.positions().is_empty() {
-            self.step_table_of(&model, &self.effect(tunable).id())?.map(Tuned::of)
+            let table = self.step_table_of(&model, &self.effect(tunable).id())?;
+            let variance = self.variance(&model);
+            table.map(|table| Tuned::of(self.with_best_positions(&model.tuning(), table, variance)))
         } else {
             match self.with_best_numbers(&model.tuning(), &model, tunable, model.gain(tunable)?.gain) {
                 None => return Ok(Some(tunable)),
@@ -208,32 +215,6 @@ impl SearchState<'_> {
             }
         }
         (best > before * (1.0 + 1e-6)).then_some((Tuned { original, effect, selection_penalty }, best))
-    }
-
-    /// Moves each step position by fractions of the grid for the largest joint gain. Returns the effect and its gain.
-    fn with_best_positions(&self, tuning: &Tuning<'_>, table: &StepTable) -> (Effect, f64) {
-        let (original, dictionary) = (&table.effect, &self.candidates[table.dictionary]);
-        let channel = TunedChannel::of(self.columns, tuning, &dictionary.columns);
-        let mut present = channel.effect(&original.shape);
-        let mut best = channel.gain(&present);
-        let mut positions = original.shape.positions().to_vec();
-        for _ in 0..2 {
-            for k in 0..positions.len() {
-                let middle = positions[k];
-                for part in -3..=3 {
-                    let position = middle + dictionary.grid * f64::from(part) / 4.0;
-                    let moved = channel.effect(&original.shape.with_positions(vec![position]));
-                    let gain = channel.gain_with(&present, k, &moved);
-                    if gain > best * (1.0 + 1e-9) {
-                        best = gain;
-                        positions[k] = position;
-                        channel.exchange(&mut present, k, &moved);
-                    }
-                }
-            }
-        }
-        positions.sort_by(f64::total_cmp);
-        (Effect { shape: original.shape.with_positions(positions), ..original.clone() }, best)
     }
 }
 
