@@ -262,3 +262,39 @@ pub fn nearly_collinear(
     }
     Ok(found)
 }
+
+#[cfg(test)]
+mod tests {
+    use abbe_model::session::Prior;
+
+    use super::*;
+    use crate::unit::Unit;
+
+    /// Up to six quantities are named; of more, five, with the number of the others. A quantity that several groups share
+    /// with one value is one.
+    #[test]
+    fn a_long_combination_names_five_quantities() {
+        let parameter = |id: &str, role: Role| {
+            let unit = Unit { name: "um".into(), display_per_internal: 1e3 };
+            Parameter { id: id.into(), unit, size: 1.0, prior: Prior::Free, role }
+        };
+        let ids = ["EX0C", "EY0C", "EX0A", "EY0A", "EZ0A", "EX0B", "EY0B"];
+        let list: Vec<Parameter> = ids.iter().map(|id| parameter(id, Role::Error)).collect();
+        let of = |count: usize| -> Vec<(String, f64)> {
+            ids[..count].iter().enumerate().map(|(k, id)| (id.to_string(), 1.0 + k as f64)).collect()
+        };
+        let six = "EX0C is confounded with EY0C, EX0A, EY0A, EZ0A, EX0B: 1 : 2 : 3 : 4 : 5 : 6";
+        assert_eq!(describe(&list, &of(6), CONFOUNDED), six);
+        let seven = "EX0C is confounded with EY0C, EX0A, EY0A, EZ0A and 2 more together: 1 : 2 : 3 : 4 : 5 : …";
+        assert_eq!(describe(&list, &of(7), CONFOUNDED), seven);
+        let list = [
+            parameter("EX0C", Role::Error),
+            parameter("workpiece_ball.x[A100]", Role::Setup),
+            parameter("workpiece_ball.x[A150]", Role::Setup),
+        ];
+        let shared = [("EX0C", 1.0), ("workpiece_ball.x[A100]", -2.0), ("workpiece_ball.x[A150]", -2.0)];
+        let shared = shared.map(|(id, value)| (id.to_string(), value));
+        let words = "EX0C is confounded with x of the workpiece ball in A100 and A150: 1 : −2";
+        assert_eq!(describe(&list, &shared, CONFOUNDED), words);
+    }
+}

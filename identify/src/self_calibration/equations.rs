@@ -330,3 +330,17 @@ fn angular_distance(a: f64, b: f64) -> f64 {
     let turned = (a - b).rem_euclid(TAU);
     turned.min(TAU - turned)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_are_above_minus_half_a_turn_and_up_to_it() {
+        for (angle, expected) in
+            [(1.5 * PI, -0.5 * PI), (-0.5 * PI, -0.5 * PI), (PI, PI), (-PI, PI), (2.5 * PI, 0.5 * PI)]
+        {
+            assert!((wrapped(angle) - expected).abs() < 1e-12, "{angle}: {}", wrapped(angle));
+        }
+    }
+}

@@ -243,6 +243,11 @@ fn the_reading_of_a_probe_in_every_language() {
             assert!(page.contains(start), "{language} {order}: {page}");
         }
     }
+    // The quantities of the quadratic equation have names where they are computed, and none in a sum of first order.
+    let code = |order: &str| of("1a", &["--as", "c", "--order", order]);
+    let named = |code: &str| ["double a =", "double b =", "double c ="].map(|name| code.contains(name));
+    assert_eq!(named(&code("exact")), [true; 3], "{}", code("exact"));
+    assert_eq!(named(&code("first")), [false; 3], "{}", code("first"));
     refused(
         &["equation", text(&session), "--test", "1a", "--gradient"],
         &["the derivatives of a probed distance are written as code only"],

@@ -250,6 +250,9 @@ fn shifted_origins_come_back_within_their_uncertainty() {
             touched(&mut session, &case);
             let calibration = calibrate(&session).unwrap();
             let report = calibration.report(&session, None);
+            // The origin turns about the axis.
+            let (circle, expected) = (report.circle_radius_um.unwrap(), 1e3 * axis[0].hypot(axis[1]));
+            assert!((circle - expected).abs() < 0.2 + 3.5e3 * noise, "{circle} {expected}");
             for parameters in [&report.parameters, &report.parameters_by_turn] {
                 for (parameter, axis) in parameters.iter().zip(axis) {
                     let miss = (parameter.value - axis * 1e3).abs();

@@ -9,8 +9,9 @@ use crate::suite::{abbe, text};
 const LINKS_MM: [f64; 2] = [300.0, 200.0];
 
 /// The session of a planar arm before a tracker in the frame of the base. `zero_deg` is the error of the second joint's zero,
-/// `wave_um` the amplitude of a motion of the first joint's axis along X, twice per turn.
-fn session(folder: &std::path::Path, zero_deg: f64, wave_um: f64, declared: &str) -> std::path::PathBuf {
+/// `waves_um` the
+/// amplitudes of motions of the first joint's axis, along X twice per turn and along Y three times.
+fn session(folder: &std::path::Path, zero_deg: f64, waves_um: [f64; 2], declared: &str) -> std::path::PathBuf {
     let machine = format!(
         "name = \"Arm\"\nchain = \"w b J1 J2 t\"\n\n[axis.J1]\nkind = \"rotary\"\ndirection = [0, 0, 1]\n\n\
          [axis.J2]\nkind = \"rotary\"\ndirection = [0, 0, -1]\norigin_mm = [{}, 0, 0]\n",
@@ -32,9 +33,9 @@ fn session(folder: &std::path::Path, zero_deg: f64, wave_um: f64, declared: &str
         let a = first.to_radians();
         // The second joint turns about −Z.
         let b = a - (second + zero_deg).to_radians();
-        let along = wave_um * 1e-3 * (2.0 * a).cos();
-        let x = LINKS_MM[0] * a.cos() + LINKS_MM[1] * b.cos() + along;
-        let y = LINKS_MM[0] * a.sin() + LINKS_MM[1] * b.sin();
+        let [along_x, along_y] = [waves_um[0] * (2.0 * a).cos(), waves_um[1] * (3.0 * a).cos()].map(|um| um * 1e-3);
+        let x = LINKS_MM[0] * a.cos() + LINKS_MM[1] * b.cos() + along_x;
+        let y = LINKS_MM[0] * a.sin() + LINKS_MM[1] * b.sin() + along_y;
         let [u, v, w] = [drawn(), drawn(), drawn()].map(|one| one * 0.01);
         let _ = writeln!(table, "{first},{second},{},{},{}", x + u, y + v, w);
     }
@@ -64,7 +65,7 @@ fn what_to_correct(session: &std::path::Path) -> (String, serde_json::Value) {
 #[test]
 fn a_joint_zero_is_a_correction() {
     let folder = tempfile::tempdir().unwrap();
-    let (line, fit) = what_to_correct(&session(folder.path(), 0.05, 0.0, ""));
+    let (line, fit) = what_to_correct(&session(folder.path(), 0.05, [0.0; 2], ""));
     let change = &fit["statements"]["correct"][0];
     let [value, u] = ["change", "u"].map(|key| change[key].as_f64().unwrap());
     assert_eq!((change["quantity"].as_str(), change["axis"].as_str()), (Some("zero"), Some("J2")), "{fit}");
@@ -72,7 +73,7 @@ fn a_joint_zero_is_a_correction() {
     assert!((change["identified"].as_f64().unwrap() * 3600.0 - value).abs() < 1e-9, "{change}");
     assert!(line.contains("zero of J2 18") || line.contains("zero of J2 17"), "{line}");
     // Within its uncertainty it is none.
-    let (line, _) = what_to_correct(&session(folder.path(), 0.0, 0.0, ""));
+    let (line, _) = what_to_correct(&session(folder.path(), 0.0, [0.0; 2], ""));
     assert!(line.contains("nothing; no axis deviates"), "{line}");
 }
 
@@ -81,11 +82,29 @@ fn a_joint_zero_is_a_correction() {
 fn an_effect_is_a_correction() {
     let folder = tempfile::tempdir().unwrap();
     let declared = "[[effect]]\ncomponent = \"EXJ1\"\ndriver = \"J1\"\nshape = \"harmonic\"\norder = 2\n";
-    let (line, fit) = what_to_correct(&session(folder.path(), 0.0, 60.0, declared));
+    let (line, fit) = what_to_correct(&session(folder.path(), 0.0, [60.0, 0.0], declared));
     let named = &fit["statements"]["further"];
     assert_eq!(named.as_array().unwrap().len(), 1, "{named}");
     assert!(named[0]["id"].as_str().unwrap().starts_with("EXJ1~J1:h2"), "{named}");
     assert!(line.contains("EXJ1~J1:h2"), "{line}");
-    let (line, fit) = what_to_correct(&session(folder.path(), 0.0, 0.0, declared));
+    let (line, fit) = what_to_correct(&session(folder.path(), 0.0, [0.0; 2], declared));
     assert!(fit["statements"].get("further").is_none() && !line.contains("EXJ1"), "{line}");
+}
+
+/// Every effect that exceeds its uncertainty is a correction of its own, with its amplitude and without its phase.
+#[test]
+fn each_effect_is_one_correction() {
+    let folder = tempfile::tempdir().unwrap();
+    let effect = |component: &str, order: usize| {
+        format!("[[effect]]\ncomponent = \"{component}\"\ndriver = \"J1\"\nshape = \"harmonic\"\norder = {order}\n\n")
+    };
+    let declared = effect("EXJ1", 2) + &effect("EYJ1", 3) + &effect("EZJ1", 4);
+    let (_, fit) = what_to_correct(&session(folder.path(), 0.0, [60.0, 40.0], &declared));
+    let named = fit["statements"]["further"].as_array().unwrap();
+    assert_eq!(named.len(), 2, "{named:?}");
+    for (item, (id, amplitude_um)) in named.iter().zip([("EXJ1~J1:h2", 60.0), ("EYJ1~J1:h3", 40.0)]) {
+        let [value, u] = ["value", "u"].map(|key| item[key].as_f64().unwrap());
+        assert!(item["id"].as_str().unwrap().starts_with(id), "{named:?}");
+        assert!((value - amplitude_um).abs() < 4.0 * u && u < 5.0, "{named:?}");
+    }
 }
