@@ -99,6 +99,38 @@ impl Scan {
         Scan { residual, responses: responses.collect(), truths, parameter_space }
     }
 
+    /// The same readings with every column of an entry as an entry, without those that are another one up to its sign:
+    /// what a stepwise regression of single columns searches.
+    pub fn of_columns(&self) -> Scan {
+        const SAME: f64 = 1e-6;
+        let mut columns: Vec<DVector<f64>> = Vec::new();
+        for column in self.responses.iter().flat_map(|q| q.column_iter().map(|column| column.into_owned())) {
+            if columns.iter().all(|other| other.dot(&column).abs() < 1.0 - SAME) {
+                columns.push(column);
+            }
+        }
+        let responses = columns.iter().map(|column| DMatrix::from_column_slice(column.len(), 1, column.as_slice()));
+        Scan {
+            residual: self.residual.clone(),
+            responses: responses.collect(),
+            truths: Vec::new(),
+            parameter_space: self.parameter_space.clone(),
+        }
+    }
+
+    /// The residual and then the columns of all entries, a line for each row, for another program.
+    pub fn csv(&self) -> String {
+        let mut text = String::new();
+        for row in 0..self.residual.len() {
+            text += &format!("{:?}", self.residual[row]);
+            for value in self.responses.iter().flat_map(|q| q.row(row).iter().copied().collect::<Vec<f64>>()) {
+                text += &format!(",{value:?}");
+            }
+            text.push('\n');
+        }
+        text
+    }
+
     /// Gain and freedom of each entry.
     fn gains(&self, residual: &DVector<f64>) -> Vec<(f64, usize)> {
         self.responses.iter().map(|q| (q.tr_mul(residual).norm_squared(), q.ncols())).collect()
@@ -162,7 +194,7 @@ impl Scan {
     /// The probability of a larger norm of the response to the best entry, given that this entry is the best and given
     /// the residual beside its direction, in a session without an effect. The second value is whether the truth is named.
     pub fn selective_p_value(&self) -> (f64, bool) {
-        const STEP: f64 = 0.02;
+        const STEP: f64 = 0.005;
         let gains = self.gains(&self.residual);
         let Some((best, _)) = Scan::best(&gains) else { return (1.0, false) };
         let (gain, freedom) = gains[best];

@@ -79,6 +79,71 @@ fn power_is_a_share_of_that_of_detectors_that_know_more() {
     }
 }
 
+/// Sessions without an effect, and with one at twice the smallest size.
+fn without_and_at_twice() -> [(&'static str, Vec<TracedSession>); 2] {
+    let null = run(0..sessions(), |number| {
+        let (kind, noise) = case(number);
+        (kind, noise, Vec::new())
+    });
+    let twice = run(0..sessions(), |number| at_multiple_of_smallest(2.0, number));
+    [("no effect", null), ("one effect at twice", twice)]
+}
+
+/// The scan of a session; one without an effect is searched for the entries that belong to a random effect.
+fn scan(outcome: &TracedSession) -> Scan {
+    let oracle = oracle(outcome.kind, outcome.noise);
+    let truths = &outcome.draw.truth.effects;
+    let like = match truths.is_empty() {
+        true => vec![oracle.random_detectable(1.0, &mut random(2, outcome.number))],
+        false => truths.clone(),
+    };
+    Scan::of(&oracle, &outcome.draw, &like)
+}
+
+/// `fsInf` and `forwardStop` of R on the sessions of [`selective_inference_beside_null_draws`]: the p-value of their first
+/// step against [`Scan::selective_p_value`], which integrates along the found direction, and their claims beside those of
+/// the trace.
+#[test]
+#[ignore = "needs Rscript with the package selectiveInference"]
+fn selective_inference_of_r() {
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/study/stepwise.R");
+    let folder = tempfile::tempdir().unwrap();
+    for (title, outcomes) in without_and_at_twice() {
+        let judged: Vec<_> = outcomes
+            .par_iter()
+            .map(|outcome| {
+                let scan = scan(outcome).of_columns();
+                let file = folder.path().join(format!("{}.csv", outcome.number));
+                std::fs::write(&file, scan.csv()).unwrap();
+                let run = std::process::Command::new("Rscript").arg(script).arg(&file).output().unwrap();
+                assert!(run.status.success(), "{}: {}", run.status, String::from_utf8_lossy(&run.stderr));
+                std::fs::remove_file(file).unwrap();
+                let text = String::from_utf8(run.stdout).unwrap();
+                let numbers: Vec<f64> = text.split_whitespace().map(|word| word.parse().unwrap()).collect();
+                (numbers[0], numbers[5] as usize, scan.selective_p_value().0)
+            })
+            .collect();
+        let rate = |hit: &dyn Fn(usize) -> bool| {
+            let mut rate = Rate::default();
+            (0..outcomes.len()).for_each(|k| rate.count(hit(k)));
+            rate
+        };
+        println!("| {title}, `fsInf` with the known noise | |\n|---|---|");
+        for level in [0.01, 0.05, 0.1, 0.5] {
+            println!("| first p-value at most {level} | {} |", rate(&|k| judged[k].0 <= level));
+        }
+        println!("| `forwardStop` at 0.01 claims a step | {} |", rate(&|k| judged[k].1 > 0));
+        println!("| `forwardStop` at 0.01 claims several | {} |", rate(&|k| judged[k].1 > 1));
+        println!("| claimed by the trace | {} |", rate(&|k| !outcomes[k].result.effects.is_empty()));
+        let apart = judged.iter().map(|(r, _, own)| (r - own).abs()).fold(0.0, f64::max);
+        println!("| largest difference of first p-values from ours | {apart:.1e} |");
+        assert!(apart < 0.01, "{title}: {judged:?}");
+        if title == "no effect" {
+            assert!(rate(&|k| judged[k].0 <= 0.05).is_consistent_with_at_most(0.05), "{judged:?}");
+        }
+    }
+}
+
 /// Without an effect, and with one at twice the smallest size: claims at 1 % by the p-value of selective inference, by
 /// the null distribution of the scan, and by the trace.
 #[test]
@@ -86,22 +151,11 @@ fn selective_inference_beside_null_draws() {
     if skipped("selective_inference_beside_null_draws") {
         return;
     }
-    let null = run(0..sessions(), |number| {
-        let (kind, noise) = case(number);
-        (kind, noise, Vec::new())
-    });
-    let twice = run(0..sessions(), |number| at_multiple_of_smallest(2.0, number));
-    for (title, outcomes) in [("no effect", null), ("one effect at twice", twice)] {
+    for (title, outcomes) in without_and_at_twice() {
         let judged: Vec<_> = outcomes
             .par_iter()
             .map(|outcome| {
-                let oracle = oracle(outcome.kind, outcome.noise);
-                let truths = &outcome.draw.truth.effects;
-                let like = match truths.is_empty() {
-                    true => vec![oracle.random_detectable(1.0, &mut random(2, outcome.number))],
-                    false => truths.clone(),
-                };
-                let scan = Scan::of(&oracle, &outcome.draw, &like);
+                let scan = scan(outcome);
                 let (p_value, named) = scan.selective_p_value();
                 (p_value, named, scan.detect(outcome.number as u64))
             })
