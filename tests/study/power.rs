@@ -137,7 +137,7 @@ fn selective_inference_of_r() {
         println!("| claimed by the trace | {} |", rate(&|k| !outcomes[k].result.effects.is_empty()));
         let apart = judged.iter().map(|(r, _, own)| (r - own).abs()).fold(0.0, f64::max);
         println!("| largest difference of first p-values from ours | {apart:.1e} |");
-        assert!(apart < 0.01, "{title}: {judged:?}");
+        assert!(apart < 0.02, "{title}: {judged:?}");
         if title == "no effect" {
             assert!(rate(&|k| judged[k].0 <= 0.05).is_consistent_with_at_most(0.05), "{judged:?}");
         }
