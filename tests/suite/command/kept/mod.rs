@@ -89,6 +89,15 @@ fn lines_of(path: &str, value: &Value, lines: &mut String) {
         Value::Object(fields) => {
             fields.iter().for_each(|(key, value)| lines_of(&format!("{path}.{key}"), value, lines))
         }
+        // The basis of a null space depends on the processor. The diagonal of the projector on it does not.
+        Value::Array(directions) if path.ends_with(".null_directions") => {
+            writeln!(lines, "{path}: {} directions", directions.len()).unwrap();
+            let entry = |direction: &Value, k: usize| direction[k].as_f64().unwrap();
+            let square = |k: usize| directions.iter().map(|direction| entry(direction, k).powi(2)).sum::<f64>();
+            let parameters = directions.first().map_or(0, |direction| direction.as_array().unwrap().len());
+            let diagonal = (0..parameters).map(|k| Value::from(square(k))).collect();
+            lines_of(&format!("{path}.projector"), &Value::Array(diagonal), lines);
+        }
         Value::Array(entries) => {
             let kept = if path.ends_with(".covariance.matrix") { KEPT_OF_A_MATRIX } else { KEPT_OF_A_LIST };
             let step = entries.len().div_ceil(kept).max(1);
