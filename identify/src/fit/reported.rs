@@ -66,7 +66,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
         degrees_of_freedom: fit.degrees_of_freedom,
         birge_ratio: fit.birge_ratio,
         u_enlargement: fit.u_enlargement,
-        identifiable: ids(&parameters),
+        identifiable: ids(problem, &parameters),
         covariance: covariance::of_parameters(problem, fit, &parameters),
         unobservable: unobservable(problem, &fit.rank),
         null_space: covariance::null_space(problem, &fit.rank),
@@ -201,9 +201,10 @@ fn amplitude_and_phase(problem: &Problem, fit: &Fit, j: usize) -> [ParameterResu
     pair
 }
 
-/// The identifiers of parameters.
-pub fn ids(parameters: &[ParameterResult]) -> Vec<String> {
-    parameters.iter().map(|parameter| parameter.id.clone()).collect()
+/// The identifiers of parameters that have a column of the Jacobian: positions of steps have none and count in no rank.
+pub fn ids(problem: &Problem, parameters: &[ParameterResult]) -> Vec<String> {
+    let ids = parameters.iter().map(|parameter| parameter.id.clone());
+    ids.filter(|id| !problem.parameters.is_position(id)).collect()
 }
 
 /// The null-space combinations, in display units and in words.

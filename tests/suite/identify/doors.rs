@@ -384,6 +384,12 @@ fn positions_of_steps() {
     let position = list(&walk.fit["parameters"], "fit").iter().find(|own| own["id"] == "EZC~C:steps.at").unwrap();
     assert_eq!(position["interval_95"], serde_json::json!([80.5, 81.0]), "{position}");
     assert!((position["u"].as_f64().unwrap() - 0.5 / 12_f64.sqrt()).abs() < 0.01, "{position}");
+    // A position has no column: it counts neither among the parameters nor among the identifiable ones.
+    for model in [&walk.fit, &walk.trace["after"]] {
+        let identifiable = list(&model["identifiable"], "identifiable");
+        assert!(identifiable.iter().all(|id| id != "EZC~C:steps.at"), "{identifiable:?}");
+        assert_eq!(model["parameter_count"], identifiable.len(), "{identifiable:?}");
+    }
 }
 
 /// The centre and the width of a local feature are parameters with an uncertainty, whichever door one asks at.

@@ -237,7 +237,7 @@ pub(super) fn model_result(problem: &Problem, fit: &Fit, held_out_mm: f64) -> Re
         chi_square: fit.chi_square,
         degrees_of_freedom: fit.degrees_of_freedom,
         goodness,
-        identifiable: fit::ids(&parameters),
+        identifiable: fit::ids(problem, &parameters),
         covariance: fit::covariance_of_parameters(problem, fit, &parameters),
         parameters,
     })
