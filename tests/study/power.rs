@@ -104,8 +104,15 @@ fn scan(outcome: &TracedSession) -> Scan {
 /// step against [`Scan::selective_p_value`], which integrates along the found direction, and their claims beside those of
 /// the trace.
 #[test]
-#[ignore = "needs Rscript with the package selectiveInference"]
 fn selective_inference_of_r() {
+    if skipped("selective_inference_of_r") {
+        return;
+    }
+    // Debian does not package it.
+    if test_needs::first(&["Rscript"], &["-e", "library(selectiveInference)"]).is_none() {
+        test_needs::skip_in_ci_too("selective_inference_of_r", "no Rscript with the package selectiveInference");
+        return;
+    }
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/study/stepwise.R");
     let folder = tempfile::tempdir().unwrap();
     for (title, outcomes) in without_and_at_twice() {

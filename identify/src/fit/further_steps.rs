@@ -20,6 +20,7 @@ use abbe_model::effect::Effect;
 use super::positions::Projection;
 use super::{Fit, Problem};
 use crate::error::IdentifyError;
+use crate::numerics::regression::dot;
 use crate::parameters::Role;
 
 /// Positions at which a further step is tried, at even distances on the travel.
@@ -63,20 +64,25 @@ pub(super) fn at_solution(problem: &Problem, fit: &Fit) -> Result<Vec<(f64, Vec<
         // Logarithm of the Bayes factor, and changes for the root mean square of the height.
         let tried: Vec<(f64, Vec<f64>)> = columns
             .clone()
-            .filter_map(|j| {
+            .map(|j| {
                 let column: Vec<f64> = (0..r.nrows()).map(|i| r[(i, j)] * sizes[j]).collect();
-                let split = model.split(&column);
-                let information = Projection::information(&column, &split.1)?;
-                let height: f64 = split.1.iter().zip(&residual).map(|(a, b)| a * b).sum::<f64>() / information;
-                let variance = fit.u_enlargement.powi(2) / information;
+                let (along, rest) = model.split(&column);
                 let prior = mean_square / (sizes[j] * sizes[j]);
-                let share = prior / (prior + variance);
-                let ln_factor = 0.5 * (1.0 - share).ln() + 0.5 * share * height * height / variance;
-                let root_mean_square = ((share * height).powi(2) + share * variance).sqrt();
+                let (ln_factor, mean_square) = match Projection::information(&column, &rest) {
+                    // The readings say nothing about its height.
+                    None => (0.0, prior),
+                    Some(information) => {
+                        let height = dot(&rest, &residual) / information;
+                        let variance = fit.u_enlargement.powi(2) / information;
+                        let share = prior / (prior + variance);
+                        let of_height = share * height * height / variance;
+                        (0.5 * ((1.0 - share).ln() + of_height), (share * height).powi(2) + share * variance)
+                    }
+                };
                 let mut changes = vec![0.0; count];
-                let along: Vec<f64> = split.0.iter().map(|along| -along * root_mean_square).collect();
+                let along: Vec<f64> = along.iter().map(|along| -along * mean_square.sqrt()).collect();
                 model.add(&along, &sizes, &mut changes);
-                Some((ln_factor, changes))
+                (ln_factor, changes)
             })
             .collect();
         let most = tried.iter().map(|(ln_factor, _)| *ln_factor).fold(0.0, f64::max);

@@ -70,6 +70,7 @@ pub(crate) fn fit_with_numbers(problem: &mut Problem, start: Option<&[f64]>) -> 
         }
         (*problem, found) = (moved, next);
     }
+    positions::centre(problem)?;
     Ok(found)
 }
 

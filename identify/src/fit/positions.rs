@@ -21,6 +21,7 @@ use faer::Mat;
 
 use super::{Fit, Problem};
 use crate::error::IdentifyError;
+use crate::numerics::regression::dot;
 use crate::numerics::solve::Svd;
 use crate::numerics::tails::QUANTILE_95;
 use crate::parameters::Role;
@@ -124,10 +125,6 @@ impl Projection {
             }
         }
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 impl Step<'_> {
@@ -279,6 +276,31 @@ pub(super) fn moved(problem: &Problem, beta: &[f64]) -> Result<Option<(Problem, 
     let mut beta: Vec<f64> = beta.iter().zip(&best.changes).map(|(value, change)| value + change).collect();
     problem.linearise_numbers(&mut beta)?;
     Ok(Some((problem, beta)))
+}
+
+/// Moves each step to the middle of its gap, which changes no reading: there its standard uncertainty is that of every
+/// position in the gap.
+///
+/// # Errors
+/// If the data lack the column of the driver.
+pub(super) fn centre(problem: &mut Problem) -> Result<(), IdentifyError> {
+    let levels = levels(problem)?;
+    let steps = steps(problem, &levels);
+    let centred = steps.iter().filter_map(|step| {
+        let [low, high] = [step.levels[step.gap - 1], step.levels[step.gap]];
+        let shares_gap =
+            |other: &Step<'_>| other.effect == step.effect && other.step != step.step && other.gap == step.gap;
+        let is_inside = low < step.at && step.at <= high;
+        (is_inside && !steps.iter().any(shares_gap)).then_some((step.effect, step.step, 0.5 * (low + high)))
+    });
+    let centred: Vec<(usize, usize, f64)> = centred.collect();
+    for (effect, step, middle) in centred {
+        let shape = &mut problem.parameters.effects[effect].shape;
+        let mut positions = shape.positions().to_vec();
+        positions[step] = middle;
+        *shape = shape.with_positions(positions);
+    }
+    Ok(())
 }
 
 /// By how much χ² falls if a step moves from its own gap to the best one.

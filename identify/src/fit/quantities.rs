@@ -55,7 +55,11 @@ pub(crate) fn quantities(problem: &Problem, fit: &Fit) -> Vec<Quantity> {
         }
         if let Role::Coefficient { effect, coefficient } = list[j].role {
             let is_last = coefficient + 1 == problem.parameters.effects[effect].shape.coefficients();
-            let own = (0..fit.positions.len()).filter(|k| is_last && fit.positions[*k].effect == effect);
+            // The position of a step whose height is not identifiable is none either.
+            let is_seen = |position: &StepPosition| {
+                position.effect == effect && rank.is_identifiable(j - coefficient + position.step)
+            };
+            let own = (0..fit.positions.len()).filter(|k| is_last && is_seen(&fit.positions[*k]));
             quantities.extend(own.map(Quantity::Position));
         }
         j += 1;

@@ -383,6 +383,8 @@ fn positions_of_steps() {
     // Readings are half a degree apart, and a reading at the position is beyond the step.
     let position = list(&walk.fit["parameters"], "fit").iter().find(|own| own["id"] == "EZC~C:steps.at").unwrap();
     assert_eq!(position["interval_95"], serde_json::json!([80.5, 81.0]), "{position}");
+    // The middle: its standard uncertainty is that of every position between the two.
+    assert!((position["value"].as_f64().unwrap() - 80.75).abs() < 1e-9, "{position}");
     assert!((position["u"].as_f64().unwrap() - 0.5 / 12_f64.sqrt()).abs() < 0.01, "{position}");
     // A position has no column: it counts neither among the parameters nor among the identifiable ones.
     for model in [&walk.fit, &walk.trace["after"]] {

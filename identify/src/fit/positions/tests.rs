@@ -9,7 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
 use super::*;
-use crate::fit::{contribution_beside_noise, fit, prepare, refit};
+use crate::fit::{contribution_beside_noise, fit, parameters, prepare, refit};
 
 /// True positions, rad, and heights, mm, of steps that are added to measured readings.
 const AT: [f64; 2] = [1.3, 3.6];
@@ -188,4 +188,36 @@ fn uncertainties_cover_a_further_step() {
         }
     }
     assert!(compared >= 3, "{compared}");
+}
+
+/// A step is reported in the middle of the gap between two readings, wherever in it the search left it. A step whose height
+/// no reading determines has no position.
+#[test]
+fn positions_are_in_the_middle_of_their_gaps_and_only_of_heights_that_are_determined() {
+    let problem = problem();
+    let mut estimated = with_steps(&problem, &AT);
+    let first = fit(&estimated, None).unwrap();
+    let found = refit(&mut estimated, &first).unwrap();
+    let levels = estimated.levels(estimated.parameters.effects.last().unwrap()).unwrap();
+    for at in positions(&estimated) {
+        let beyond = levels.partition_point(|level| *level < at);
+        assert!((at - 0.5 * (levels[beyond - 1] + levels[beyond])).abs() < 1e-12, "{at}");
+    }
+    let ids = |problem: &Problem, fit: &Fit| -> Vec<String> {
+        parameters(problem, fit).into_iter().map(|parameter| parameter.id).filter(|id| id.contains(".at")).collect()
+    };
+    assert_eq!(ids(&estimated, &found), ["EZC~C:steps.at1", "EZC~C:steps.at2"]);
+    // The axial motion of C over A: with C at rest it is that of the ball on the table.
+    let mut over_a = problem.clone();
+    let effect = Effect {
+        driver: Driver::parse("A"),
+        shape: Shape::Steps(Steps { at: vec![0.3, 0.9] }),
+        ..estimated.parameters.effects.last().unwrap().clone()
+    };
+    over_a.add_effect(&effect).unwrap();
+    let first = fit(&over_a, None).unwrap();
+    let found = refit(&mut over_a, &first).unwrap();
+    let height = over_a.parameters.list.len() - 2;
+    assert!(!found.rank.is_identifiable(height) && !found.positions.is_empty());
+    assert!(ids(&over_a, &found).is_empty(), "{:?}", ids(&over_a, &found));
 }
