@@ -22,7 +22,7 @@ use crate::numerics::triangle::Triangle;
 use crate::problem::Problem;
 pub use figures::cross_validation;
 pub use folds::{FoldKind, Folds, mislabelled_runs};
-pub use joint_space::{coordinates, squared_distance};
+pub use joint_space::{coordinates, nearest_of};
 pub use left_out_test::{LeftOutTests, NotLeftOut, left_out_tests};
 
 /// Held-out residuals.

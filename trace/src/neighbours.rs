@@ -14,7 +14,7 @@
 //! decides. For the p-value these are of the null draws and the residual together: a reference that lacks the residual would
 //! make it an outsider, and reject too often.
 
-use abbe_identify::heldout::{coordinates, squared_distance};
+use abbe_identify::heldout::{coordinates, nearest_of};
 use abbe_identify::numerics::parallel;
 use abbe_identify::problem::Problem;
 use abbe_model::axis::AxisKind;
@@ -225,10 +225,9 @@ impl Poses {
         let asked: Vec<usize> = (0..points.len()).step_by(step).collect();
         parallel::map(asked.len(), &|k| {
             let own = asked[k];
-            let others =
-                (0..points.len()).filter(|other| *other != own && self.rows[*other].len() == self.rows[own].len());
-            let distances = others.map(|other| (squared_distance(points[own], points[other]), other));
-            distances.min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, other)| (own, other))
+            let is_comparable = |other: &usize| *other != own && self.rows[*other].len() == self.rows[own].len();
+            let others = (0..points.len()).filter(is_comparable).map(|other| (other, points[other].as_slice()));
+            nearest_of(points[own], others).map(|other| (own, other))
         })
         .into_iter()
         .flatten()

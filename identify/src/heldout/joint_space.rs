@@ -27,6 +27,8 @@ const STARTS: usize = 4;
 const MAX_ITERATIONS: usize = 100;
 /// Maximum number of poses from which the centres follow. Further poses only join the nearest centre.
 const MAX_SAMPLE: usize = 4000;
+/// Coordinates after which a distance is compared with the least one so far.
+const COORDINATES_AT_ONCE: usize = 4;
 
 /// The block of each pose, over all tests, numbered in the order of the poses. `None` if there are too few poses, or if
 /// all have the same axis positions.
@@ -97,8 +99,25 @@ pub fn coordinates(machine: &Machine, readings: &[&Readings]) -> Vec<Point> {
 }
 
 /// The square of the distance of two points of joint space, in the units of [`coordinates`].
-pub fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
+fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum()
+}
+
+/// The place of the point of some others that is nearest to a point; the first of equally near ones.
+pub fn nearest_of<'p>(point: &[f64], others: impl Iterator<Item = (usize, &'p [f64])>) -> Option<usize> {
+    let mut nearest = (None, f64::INFINITY);
+    for (place, other) in others {
+        // Most points are further away already by the first coordinates.
+        let mut distance = 0.0;
+        let is_nearer = point.chunks(COORDINATES_AT_ONCE).zip(other.chunks(COORDINATES_AT_ONCE)).all(|(a, b)| {
+            distance = a.iter().zip(b).fold(distance, |sum, (a, b)| sum + (a - b).powi(2));
+            distance < nearest.1
+        });
+        if is_nearer {
+            nearest = (Some(place), distance);
+        }
+    }
+    nearest.0
 }
 
 /// The index of the nearest centre, and the squared distance to it.
@@ -217,6 +236,22 @@ mod tests {
         let axis = |q: [f64; 3]| Readings { positions: vec![q.to_vec()], ..Readings::default() };
         let (first, second) = (axis([0.1, 0.2, 0.3]), axis([0.3, 0.1, 0.2]));
         assert_eq!(poses(&[&first, &second]), [0, 1, 2, 2, 0, 1]);
+    }
+
+    /// Of points in nine coordinates the nearest is the one with the least of all distances; of two equally near ones the first.
+    #[test]
+    fn the_nearest_point_has_the_least_distance() {
+        let mut random = Pcg64::seed_from_u64(3);
+        let points: Vec<Point> = (0..200).map(|_| (0..9).map(|_| random.random_range(-1.0..1.0)).collect()).collect();
+        for (k, point) in points.iter().enumerate() {
+            let others = || (0..points.len()).filter(|other| *other != k);
+            let expected = others().map(|other| (squared_distance(point, &points[other]), other));
+            let expected = expected.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, other)| other);
+            assert_eq!(nearest_of(point, others().map(|other| (other, points[other].as_slice()))), expected);
+        }
+        let twice = [(7, &points[0][..]), (4, &points[1][..]), (2, &points[1][..])];
+        assert_eq!(nearest_of(&points[1], twice.into_iter()), Some(4));
+        assert_eq!(nearest_of(&points[1], std::iter::empty()), None);
     }
 
     #[test]
