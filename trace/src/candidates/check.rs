@@ -119,9 +119,9 @@ fn gains_are_those_of_least_squares() {
     }
 }
 
-/// With another residual the gains are those of products that are formed for it, on all readings and without one fold.
+/// With other residuals the gains are those of products that are formed for each, on all readings and without one fold.
 #[test]
-fn products_serve_another_residual() {
+fn products_serve_other_residuals() {
     let (problem, beta) = problem(&[0.4]);
     let columns = Columns::new(&problem, &beta);
     let (model, residual) = model(&columns, &beta);
@@ -132,16 +132,20 @@ fn products_serve_another_residual() {
         Gram::new(&columns, sets.clone(), Arc::new(model.clone()), residual, prior)
     };
     let other: Vec<f64> = residual.iter().enumerate().map(|(i, r)| 0.3 * r + (0.7 * i as f64).sin()).collect();
-    let (known, formed) = (of(&residual).with_residual(&other, &|| true).unwrap(), of(&other).keeping_nothing());
+    let reverse: Vec<f64> = other.iter().rev().copied().collect();
     let all: Vec<usize> = (0..columns.fold_rows.len()).collect();
-    for folds in [all.clone(), all[1..].to_vec()] {
-        let gains = |gram: &Gram<'_>| TrainedModel::new(gram, &[], &folds).unwrap().gains(&|_| true).unwrap();
-        let (found, expected) = (gains(&known), gains(&formed));
-        let greatest = expected.iter().map(|gain| gain.gain).fold(0.0, f64::max);
-        assert!(greatest > 1.0 && found.len() == sets.len());
-        for (k, (found, expected)) in found.iter().zip(&expected).enumerate() {
-            assert_eq!(found.freedom, expected.freedom, "{k}");
-            assert!((found.gain - expected.gain).abs() < 1e-9 * greatest, "{k}: {} {}", found.gain, expected.gain);
+    let others = [other, reverse];
+    for (known, other) in of(&residual).with_residuals(&others, &|| true).unwrap().iter().zip(&others) {
+        let formed = of(other).keeping_nothing();
+        for folds in [all.clone(), all[1..].to_vec()] {
+            let gains = |gram: &Gram<'_>| TrainedModel::new(gram, &[], &folds).unwrap().gains(&|_| true).unwrap();
+            let (found, expected) = (gains(known), gains(&formed));
+            let greatest = expected.iter().map(|gain| gain.gain).fold(0.0, f64::max);
+            assert!(greatest > 1.0 && found.len() == sets.len());
+            for (k, (found, expected)) in found.iter().zip(&expected).enumerate() {
+                assert_eq!(found.freedom, expected.freedom, "{k}");
+                assert!((found.gain - expected.gain).abs() < 1e-9 * greatest, "{k}: {} {}", found.gain, expected.gain);
+            }
         }
     }
 }

@@ -36,9 +36,14 @@ pub(super) fn find(
     interrupt: Interrupt<'_>,
 ) -> Result<(), IdentifyError> {
     let first = model.problem.parameters.effects.len() - model.effects.len();
-    for k in (0..model.effects.len()).filter(|k| model.effects[*k].is_single).collect::<Vec<_>>() {
+    let single: Vec<usize> = (0..model.effects.len()).filter(|k| model.effects[*k].is_single).collect();
+    let without = |k: &usize| model.problem.residuals(&beta_without(model, *k));
+    let residuals: Vec<Vec<Vec<f64>>> = single.iter().map(without).collect();
+    let nearest = library.nearest(&model.effects, &residuals, interrupt)?;
+    drop(residuals);
+    for (k, nearest) in single.into_iter().zip(nearest) {
         interrupt.check()?;
-        let aliases = of_effect(model, k, library, interrupt)?;
+        let aliases = of_effect(model, k, nearest, interrupt)?;
         model.problem.parameters.effects[first + k].aliases =
             aliases.iter().map(|alias| alias.effect.clone()).collect();
         model.effects[k].aliases = aliases;
@@ -47,29 +52,35 @@ pub(super) fn find(
     Ok(())
 }
 
-/// The aliases of the `k`-th found effect, the most probable first.
+/// Whether a parameter is a coefficient of the `k`-th found effect.
+fn is_own(model: &PoseSearch, k: usize, parameter: usize) -> bool {
+    let first = model.problem.parameters.effects.len() - model.effects.len();
+    let role = model.problem.parameters.list[parameter].role;
+    matches!(role, Role::Coefficient { effect, .. } if effect == first + k)
+}
+
+/// The parameters of the fit with the coefficients of the `k`-th found effect at zero.
+fn beta_without(model: &PoseSearch, k: usize) -> Vec<f64> {
+    model.fit.beta.iter().enumerate().map(|(j, b)| if is_own(model, k, j) { 0.0 } else { *b }).collect()
+}
+
+/// The aliases of the `k`-th found effect, the most probable first, among the candidates that are nearest to it.
 fn of_effect(
     model: &PoseSearch,
     k: usize,
-    library: &Library<'_>,
+    nearest: Vec<&Candidate>,
     interrupt: Interrupt<'_>,
 ) -> Result<Vec<PoseAlias>, IdentifyError> {
-    let found = &model.effects[k].effect;
-    let (problem, first) = (&model.problem, model.problem.parameters.effects.len() - model.effects.len());
-    let is_own = |j: &usize| {
-        let role = problem.parameters.list[*j].role;
-        matches!(role, Role::Coefficient { effect, .. } if effect == first + k)
-    };
+    let (found, problem) = (&model.effects[k].effect, &model.problem);
+    let is_own = |j: &usize| is_own(model, k, *j);
     // The families keep the scales, and the readings the noise, of the model with the effect.
     let mut all = problem.clone();
     let present = all.parameters.list.len();
-    let mut beta: Vec<f64> =
-        model.fit.beta.iter().enumerate().map(|(j, b)| if is_own(&j) { 0.0 } else { *b }).collect();
+    let mut beta = beta_without(model, k);
     let is_new = |candidate: &&Candidate| {
         let id = candidate.effect.id();
         !model.effects.iter().any(|accepted| accepted.effect.id() == id)
     };
-    let nearest = library.nearest(&model.effects, &problem.residuals(&beta), interrupt)?;
     let tried: Vec<&Candidate> = nearest.into_iter().filter(is_new).take(MAX_TUNED_ALIASES).collect();
     let mut own = vec![(0..present).filter(is_own).collect::<Vec<usize>>()];
     for candidate in &tried {

@@ -55,17 +55,18 @@ impl<'c> Library<'c> {
         Ok(Library { columns, gram, candidates, families: library::families()? })
     }
 
-    /// The candidates with a gain in a residual, the largest evidence first, without some effects.
+    /// The candidates with a gain in each of some residuals, the largest evidence first, without some effects.
     ///
     /// # Errors
     /// If the gains cannot be computed, or [`IdentifyError::Interrupted`].
     pub fn nearest(
         &self,
         effects: &[AcceptedEffect],
-        residuals: &[Vec<f64>],
+        residuals: &[Vec<Vec<f64>>],
         interrupt: Interrupt<'_>,
-    ) -> Result<Vec<&Candidate>, IdentifyError> {
-        Ok(scored(self, effects, residuals, interrupt)?.0.into_iter().map(|(k, _)| &self.candidates[k]).collect())
+    ) -> Result<Vec<Vec<&Candidate>>, IdentifyError> {
+        let candidates = |scored: Scored| scored.best.into_iter().map(|k| &self.candidates[k]).collect();
+        Ok(scored(self, effects, residuals, interrupt)?.into_iter().map(candidates).collect())
     }
 
     /// Number of candidates.
@@ -147,51 +148,58 @@ pub(super) fn add(
     Ok(ended)
 }
 
-/// The candidates with the largest gains in the residual, the largest first.
-struct Ranked {
+/// The candidates with a gain in a residual.
+struct Scored {
+    /// Candidates other than the accepted effects, the largest score first.
     best: Vec<usize>,
+    /// Number of candidates that are observable beside the declared parameters.
     detectable: usize,
 }
 
-fn ranked(library: &Library<'_>, found: &PoseModel, interrupt: Interrupt<'_>) -> Result<Ranked, IdentifyError> {
-    let (scored, detectable) = scored(library, &found.effects, &found.near.residuals, interrupt)?;
+/// The candidates with the largest gains in the residual of a model.
+fn ranked(library: &Library<'_>, found: &PoseModel, interrupt: Interrupt<'_>) -> Result<Scored, IdentifyError> {
+    let residuals = std::slice::from_ref(&found.near.residuals);
+    let mut of_residuals = scored(library, &found.effects, residuals, interrupt)?;
+    let mut ranked = of_residuals.pop().unwrap_or(Scored { best: Vec::new(), detectable: 0 });
     // One for each component and driver, so that the neighbouring orders of one cause do not take all places.
     let mut kinds: Vec<(String, Driver)> = Vec::new();
-    let mut is_new = |k: usize| {
-        let effect = &library.candidates[k].effect;
+    ranked.best.retain(|k| {
+        let effect = &library.candidates[*k].effect;
         let kind = (effect.component.to_string(), effect.driver.clone());
         let new = !kinds.contains(&kind);
         kinds.push(kind);
         new
-    };
-    let best = scored.into_iter().map(|(k, _)| k).filter(|k| is_new(*k)).take(LINES_TRIED).collect();
-    Ok(Ranked { best, detectable })
+    });
+    ranked.best.truncate(LINES_TRIED);
+    Ok(ranked)
 }
 
-/// The candidates other than the accepted effects with their scores in a residual, the largest first, and the number of
-/// candidates that are observable beside the declared parameters.
+/// The candidates with a gain in each of some residuals.
 fn scored(
     library: &Library<'_>,
     effects: &[AcceptedEffect],
-    residuals: &[Vec<f64>],
+    residuals: &[Vec<Vec<f64>>],
     interrupt: Interrupt<'_>,
-) -> Result<(Vec<(usize, f64)>, usize), IdentifyError> {
+) -> Result<Vec<Scored>, IdentifyError> {
     let Library { columns, gram, candidates, .. } = library;
-    let residual = columns.whitened_values(residuals);
+    let whitened: Vec<Vec<f64>> = residuals.iter().map(|residuals| columns.whitened_values(residuals)).collect();
     let should_continue = || interrupt.check().is_ok();
-    let gram = gram.with_residual(&residual, &should_continue)?;
+    let grams = gram.with_residuals(&whitened, &should_continue)?;
     let folds: Vec<usize> = (0..columns.fold_rows.len()).collect();
-    let trained = TrainedModel::new(&gram, &[], &folds)?;
-    let square: f64 = residual.iter().map(|value| value * value).sum();
-    let variance = (square / columns.rows().max(1) as f64).max(f64::MIN_POSITIVE);
-    let gains = trained.gains(&|_| true)?;
     let chosen: Vec<_> = effects.iter().map(|accepted| &accepted.effect).collect();
-    let mut scored: Vec<(usize, f64)> = (gains.iter().enumerate())
-        .filter(|(k, gain)| gain.freedom > 0 && !chosen.contains(&&candidates[*k].effect))
-        .map(|(k, gain)| (k, -ln_chi_square_tail(gain.gain / variance, gain.freedom) - candidates[k].cost))
-        .collect();
-    scored.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    Ok((scored, gains.iter().filter(|gain| gain.freedom > 0).count()))
+    let scored = |(gram, residual): (Gram<'_>, &Vec<f64>)| {
+        let square: f64 = residual.iter().map(|value| value * value).sum();
+        let variance = (square / columns.rows().max(1) as f64).max(f64::MIN_POSITIVE);
+        let gains = TrainedModel::new(&gram, &[], &folds)?.gains(&|_| true)?;
+        let mut scores: Vec<(usize, f64)> = (gains.iter().enumerate())
+            .filter(|(k, gain)| gain.freedom > 0 && !chosen.contains(&&candidates[*k].effect))
+            .map(|(k, gain)| (k, -ln_chi_square_tail(gain.gain / variance, gain.freedom) - candidates[k].cost))
+            .collect();
+        scores.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let detectable = gains.iter().filter(|gain| gain.freedom > 0).count();
+        Ok(Scored { best: scores.into_iter().map(|(k, _)| k).collect(), detectable })
+    };
+    grams.into_iter().zip(&whitened).map(scored).collect()
 }
 
 /// A candidate that lowers the held-out error.

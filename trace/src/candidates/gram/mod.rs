@@ -266,19 +266,27 @@ impl<'c> Gram<'c> {
         Adjoint { rows, values }
     }
 
-    /// The products of the library over all rows with another residual.
+    /// The products of the library over all rows with each of some other residuals.
     ///
     /// # Errors
     /// If products are not finite, or [`IdentifyError::Interrupted`] if `should_continue` returns `false`.
-    pub fn with_residual(
+    pub fn with_residuals(
         &self,
-        residual: &[f64],
+        residuals: &[Vec<f64>],
         should_continue: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Gram<'c>, IdentifyError> {
+    ) -> Result<Vec<Gram<'c>>, IdentifyError> {
         let known = self.projection(&self.all_folds())?.products(self, 0, should_continue)?;
-        let other = Gram { residual: Arc::new(residual.to_vec()), projections: Arc::default(), ..self.clone() };
-        other.projection(&other.all_folds())?.take_products(&other, 0, &known, should_continue)?;
-        Ok(other)
+        let other = |residual: &Vec<f64>| Gram {
+            residual: Arc::new(residual.clone()),
+            projections: Arc::default(),
+            ..self.clone()
+        };
+        let others: Vec<Gram<'c>> = residuals.iter().map(other).collect();
+        let whole = |other| Ok((other, Gram::projection(other, &other.all_folds())?));
+        let projections = others.iter().map(whole).collect::<Result<Vec<_>, IdentifyError>>()?;
+        Projection::take_products(&projections, 0, &known, should_continue)?;
+        drop(projections);
+        Ok(others)
     }
 
     /// The same with everything formed anew, as in a long session.

@@ -197,22 +197,31 @@ impl Projection {
     }
 
     /// Takes the products of a segment that do not depend on the residual from the same projection with another residual.
+    /// Those with the residuals are formed at once for all of the given projections, which have the same rows.
     ///
     /// # Errors
     /// [`IdentifyError::Interrupted`] if `should_continue` returns `false`.
     pub fn take_products(
-        &self,
-        gram: &Gram<'_>,
+        projections: &[(&Gram<'_>, Arc<Projection>)],
         segment: usize,
         known: &SegmentProducts,
         should_continue: &(dyn Fn() -> bool + Sync),
     ) -> Result<(), IdentifyError> {
-        let side = Adjoint::of(&self.training, Mat::as_ref(&self.residual(gram)));
-        let formed = gram.segments[segment].layout.products(&self.training, &side, false, should_continue);
-        let g = formed.ok_or(IdentifyError::Interrupted)?.side.row(0).iter().copied().collect();
-        let products =
-            SegmentProducts { own: known.own.clone(), d: known.d.clone(), g, with_model: known.with_model.clone() };
-        stored(&self.segments, &gram.segments[segment].key, || Ok(Arc::new(products))).map(|_| ())
+        let Some((first, same)) = projections.first() else { return Ok(()) };
+        let mut residuals = Mat::zeros(first.residual.len(), projections.len());
+        for (k, (gram, projection)) in projections.iter().enumerate() {
+            residuals.as_mut().subcols_mut(k, 1).copy_from(&*projection.residual(gram));
+        }
+        let side = Adjoint::of(&same.training, residuals.as_ref());
+        let formed = first.segments[segment].layout.products(&same.training, &side, false, should_continue);
+        let formed = formed.ok_or(IdentifyError::Interrupted)?;
+        for (k, (gram, projection)) in projections.iter().enumerate() {
+            let g = formed.side.row(k).iter().copied().collect();
+            let products =
+                SegmentProducts { own: known.own.clone(), d: known.d.clone(), g, with_model: known.with_model.clone() };
+            stored(&projection.segments, &gram.segments[segment].key, || Ok::<_, IdentifyError>(Arc::new(products)))?;
+        }
+        Ok(())
     }
 
     /// `Wᵀ [X | y⊥]` over the training rows.
