@@ -15,6 +15,7 @@ use abbe_model::effect::Effect;
 use faer::Mat;
 
 use crate::error::IdentifyError;
+use crate::numerics::parallel;
 use crate::numerics::solve::Svd;
 use crate::parameters::Role;
 use crate::problem::Problem;
@@ -90,8 +91,7 @@ pub fn at_solution(problem: &Problem, beta: &[f64]) -> Result<Vec<EffectAliases>
         let without: Vec<f64> = (0..r.nrows())
             .map(|i| c[i] + (0..count).filter(|j| is_own(*j)).map(|j| r[(i, j)] * beta[j]).sum::<f64>())
             .collect();
-        let mut aliases = Vec::new();
-        for (alias, place) in own {
+        let changed = |(alias, place): &(usize, Range<usize>)| {
             let columns: Vec<usize> = others.iter().copied().chain(place.clone()).collect();
             let scaled = Mat::from_fn(r.nrows(), columns.len(), |i, k| r[(i, columns[k])] * sizes[columns[k]]);
             let step = Svd::of(scaled.as_ref())?.solve_identifiable(&without);
@@ -100,8 +100,10 @@ pub fn at_solution(problem: &Problem, beta: &[f64]) -> Result<Vec<EffectAliases>
             let residual: Vec<f64> = (0..r.nrows())
                 .map(|i| without[i] - (0..columns.len()).map(|k| scaled[(i, k)] * step[k]).sum::<f64>())
                 .collect();
-            aliases.push(AliasChange { alias: *alias, changes, delta_chi2: squares(&residual) - squares(&c) });
-        }
+            Ok(AliasChange { alias: *alias, changes, delta_chi2: squares(&residual) - squares(&c) })
+        };
+        let aliases = parallel::map(own.len(), &|k| changed(&own[k]));
+        let aliases = aliases.into_iter().collect::<Result<Vec<AliasChange>, IdentifyError>>()?;
         found.push(EffectAliases { effect: number, aliases });
     }
     Ok(found)
