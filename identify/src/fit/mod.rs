@@ -40,7 +40,7 @@ pub use covariance::{null_space, of_parameters as covariance_of_parameters};
 pub use cover::contribution as contribution_beside_noise;
 pub use numbers::NumberInterval;
 pub use positions::StepPosition;
-pub use prepare::{NearMinimum, prepare, prepare_with, refit, with_families, with_families_linearised, with_lever};
+pub use prepare::{NearMinimum, prepare, prepare_with, refit, with_families_linearised, with_lever};
 pub(crate) use quantities::{Quantity, quantities, values_at};
 pub(crate) use reported::parameters_of_noise;
 pub use reported::{ids, outliers, parameters, report, rms_of_units, unobservable};

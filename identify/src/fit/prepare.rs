@@ -7,7 +7,7 @@ use abbe_model::session::Session;
 use abbe_model::session::limits::MIN_UM;
 use faer::Mat;
 
-use super::families::{FoldEquations, families};
+use super::families::{FoldEquations, Scales, families};
 use super::numbers::{fit_with_numbers, intervals};
 use super::{Fit, further_steps, positions};
 use crate::error::IdentifyError;
@@ -188,8 +188,11 @@ fn settled(mut problem: Problem, stated: bool, floor: f64) -> Result<(Problem, F
 ///
 /// # Errors
 /// See [`prepare`].
-pub fn with_families(problem: Problem, start: Vec<f64>) -> Result<(Problem, Fit), IdentifyError> {
-    in_turn_with_families(problem, start, |problem, beta, _| {
+fn with_families(problem: Problem, start: Vec<f64>) -> Result<(Problem, Fit), IdentifyError> {
+    // With hundreds of parameters the iterations of a fit take most of the time. The outliers settle without them.
+    let (problem, near) = with_families_linearised(problem, start)?;
+    let estimate = |equations: &FoldEquations, _: &Problem| equations.estimate();
+    in_turn_with_families(problem, near.beta, estimate, |problem, beta, _| {
         let fit = super::fit(problem, Some(&beta))?;
         Ok((fit.beta.clone(), fit.residuals.clone(), fit))
     })
@@ -212,24 +215,31 @@ pub struct NearMinimum {
 /// # Errors
 /// See [`prepare`].
 pub fn with_families_linearised(problem: Problem, start: Vec<f64>) -> Result<(Problem, NearMinimum), IdentifyError> {
-    in_turn_with_families(problem, start, |problem, beta, held_out_rms_mm| {
-        let beta = super::identifiable(problem, &beta)?;
-        let residuals = problem.residuals(&beta);
-        Ok((beta.clone(), residuals.clone(), NearMinimum { beta, residuals, held_out_rms_mm }))
-    })
+    in_turn_with_families(problem, start, FoldEquations::estimate_near, linearised)
 }
 
-/// Estimates scales and noise, and fits by `fit` from the estimates, in turn with the outliers. `fit` receives the
-/// held-out rms in mm, and returns parameters, residuals and what else it finds.
+/// Parameters, residuals and the model at the minimum `beta` of the linearised problem.
+fn linearised(problem: &Problem, beta: Vec<f64>, held_out_rms_mm: f64) -> Result<Fitted<NearMinimum>, IdentifyError> {
+    let beta = super::identifiable(problem, &beta)?;
+    let residuals = problem.residuals(&beta);
+    Ok((beta.clone(), residuals.clone(), NearMinimum { beta, residuals, held_out_rms_mm }))
+}
+
+/// Parameters, residuals, and what else a fit finds.
+type Fitted<F> = (Vec<f64>, Vec<Vec<f64>>, F);
+
+/// Estimates scales and noise by `estimate`, and fits by `fit` from the estimates, in turn with the outliers. `fit` receives
+/// the held-out rms in mm, and returns parameters, residuals and what else it finds.
 fn in_turn_with_families<F>(
     mut problem: Problem,
     mut start: Vec<f64>,
-    fit: impl Fn(&Problem, Vec<f64>, f64) -> Result<(Vec<f64>, Vec<Vec<f64>>, F), IdentifyError>,
+    estimate: impl Fn(&FoldEquations, &Problem) -> Result<Scales, IdentifyError>,
+    fit: impl Fn(&Problem, Vec<f64>, f64) -> Result<Fitted<F>, IdentifyError>,
 ) -> Result<(Problem, F), IdentifyError> {
     let mut round = 0;
     loop {
         let equations = FoldEquations::of(&problem, &start)?;
-        let scales = equations.estimate()?;
+        let scales = estimate(&equations, &problem)?;
         let held_out_rms_mm = (scales.held_out_sum() / equations.readings()).sqrt() * problem.noise.likelihood_mm();
         equations.apply(&scales, &mut problem);
         let (beta, residuals, found) = fit(&problem, equations.beta(&scales), held_out_rms_mm)?;

@@ -16,7 +16,7 @@ mod single_effects;
 
 use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::families::FoldEquations;
-use abbe_identify::fit::{Fit, NearMinimum, with_families, with_families_linearised};
+use abbe_identify::fit::{Fit, NearMinimum, prepare_with, with_families_linearised};
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_model::axis::AxisKind;
@@ -148,7 +148,7 @@ pub(super) fn search(
     (interrupt.0)(Progress::Screening(library.count()));
     let limits = Limits { effects: most, significance: policy.significance, to_reach_mm: None };
     let ended = complete((problem, fit), &mut with, &library, options, true, limits, interrupt);
-    let mut chosen = PoseSearch::of(with, &library, ended)?;
+    let mut chosen = PoseSearch::of(with, &library, ended, options.seed)?;
     if may_repeat && !chosen.interrupted {
         let mut without = PoseModel::of(problem, fit);
         let limits = Limits { to_reach_mm: Some(chosen.fit.held_out.rms_mm), ..limits };
@@ -158,7 +158,7 @@ pub(super) fn search(
             }
             complete((problem, fit), &mut without, &library, options, false, limits, interrupt)
         });
-        match PoseSearch::of(without, &library, ended) {
+        match PoseSearch::of(without, &library, ended, options.seed) {
             // A model that cannot be fitted takes no place of one that can.
             Err(IdentifyError::NoConvergence { .. }) => {}
             found => {
@@ -195,7 +195,8 @@ fn determines_spectra(problem: &Problem) -> bool {
 }
 
 impl PoseSearch {
-    /// The fit of a model and how its search ended. The effects accepted before an interruption remain.
+    /// The fit of a session with the effects of a model, and how its search ended. The effects accepted before an interruption
+    /// remain.
     ///
     /// # Errors
     /// If the search ended with an error, or the model cannot be fitted.
@@ -203,14 +204,16 @@ impl PoseSearch {
         model: PoseModel,
         library: &Library<'_>,
         ended: Result<Ended, IdentifyError>,
+        seed: u64,
     ) -> Result<PoseSearch, IdentifyError> {
         let (ended, interrupted) = match ended {
             Err(IdentifyError::Interrupted) => (Ended { detectable: 0, last_p_value: 1.0 }, true),
             ended => (ended?, false),
         };
         let Ended { detectable, last_p_value } = ended;
-        let PoseModel { problem, near, effects, proposed } = model;
-        let (problem, fit) = with_families(problem, near.beta)?;
+        let PoseModel { problem, effects, proposed, .. } = model;
+        let own: Vec<Effect> = effects.iter().map(|accepted| accepted.effect.clone()).collect();
+        let (problem, fit) = prepare_with(&problem.session, &own, seed)?;
         let candidates = library.count();
         Ok(PoseSearch { problem, fit, effects, proposed, candidates, detectable, last_p_value, interrupted })
     }
