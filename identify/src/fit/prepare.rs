@@ -190,9 +190,9 @@ fn settled(mut problem: Problem, stated: bool, floor: f64) -> Result<(Problem, F
 /// See [`prepare`].
 fn with_families(problem: Problem, start: Vec<f64>) -> Result<(Problem, Fit), IdentifyError> {
     // With hundreds of parameters the iterations of a fit take most of the time. The outliers settle without them.
-    let (problem, near) = with_families_linearised(problem, start)?;
-    let estimate = |equations: &FoldEquations, _: &Problem| equations.estimate();
-    in_turn_with_families(problem, near.beta, estimate, |problem, beta, _| {
+    let (problem, near) = with_families_linearised(problem, start, None)?;
+    let estimate = |equations: &FoldEquations, _: &Problem, _: Option<f64>| equations.estimate();
+    in_turn_with_families(problem, near.beta, None, estimate, |problem, beta, _| {
         let fit = super::fit(problem, Some(&beta))?;
         Ok((fit.beta.clone(), fit.residuals.clone(), fit))
     })
@@ -207,42 +207,50 @@ pub struct NearMinimum {
     pub residuals: Vec<Vec<f64>>,
     /// Root mean square of the held-out residuals, mm.
     pub held_out_rms_mm: f64,
+    /// The inflation of the likelihood that the families require; `None` without families.
+    pub inflation: Option<f64>,
 }
 
 /// The same without iterations of the fit: a search compares many models, between which the parameters change by so little
-/// that the readings are linear in them. `start` is near the minimum.
+/// that the readings are linear in them. `start` is near the minimum, `inflation` that of the model before.
 ///
 /// # Errors
 /// See [`prepare`].
-pub fn with_families_linearised(problem: Problem, start: Vec<f64>) -> Result<(Problem, NearMinimum), IdentifyError> {
-    in_turn_with_families(problem, start, FoldEquations::estimate_near, linearised)
-}
-
-/// Parameters, residuals and the model at the minimum `beta` of the linearised problem.
-fn linearised(problem: &Problem, beta: Vec<f64>, held_out_rms_mm: f64) -> Result<Fitted<NearMinimum>, IdentifyError> {
-    let beta = super::identifiable(problem, &beta)?;
-    let residuals = problem.residuals(&beta);
-    Ok((beta.clone(), residuals.clone(), NearMinimum { beta, residuals, held_out_rms_mm }))
+pub fn with_families_linearised(
+    problem: Problem,
+    start: Vec<f64>,
+    inflation: Option<f64>,
+) -> Result<(Problem, NearMinimum), IdentifyError> {
+    let has_families = !families(&problem.parameters).is_empty();
+    in_turn_with_families(problem, start, inflation, FoldEquations::estimate_near, |problem, beta, found| {
+        let beta = super::identifiable(problem, &beta)?;
+        let residuals = problem.residuals(&beta);
+        let (held_out_rms_mm, inflation) = (found.0, has_families.then_some(found.1));
+        Ok((beta.clone(), residuals.clone(), NearMinimum { beta, residuals, held_out_rms_mm, inflation }))
+    })
 }
 
 /// Parameters, residuals, and what else a fit finds.
 type Fitted<F> = (Vec<f64>, Vec<Vec<f64>>, F);
 
-/// Estimates scales and noise by `estimate`, and fits by `fit` from the estimates, in turn with the outliers. `fit` receives
-/// the held-out rms in mm, and returns parameters, residuals and what else it finds.
+/// Estimates scales and noise by `estimate`, and fits by `fit` from the estimates, in turn with the outliers. `estimate`
+/// receives the inflation that was estimated before, `fit` the held-out rms in mm and the inflation; it returns parameters,
+/// residuals and what else it finds.
 fn in_turn_with_families<F>(
     mut problem: Problem,
     mut start: Vec<f64>,
-    estimate: impl Fn(&FoldEquations, &Problem) -> Result<Scales, IdentifyError>,
-    fit: impl Fn(&Problem, Vec<f64>, f64) -> Result<Fitted<F>, IdentifyError>,
+    mut inflation: Option<f64>,
+    estimate: impl Fn(&FoldEquations, &Problem, Option<f64>) -> Result<Scales, IdentifyError>,
+    fit: impl Fn(&Problem, Vec<f64>, (f64, f64)) -> Result<Fitted<F>, IdentifyError>,
 ) -> Result<(Problem, F), IdentifyError> {
     let mut round = 0;
     loop {
         let equations = FoldEquations::of(&problem, &start)?;
-        let scales = estimate(&equations, &problem)?;
+        let scales = estimate(&equations, &problem, inflation)?;
+        inflation = Some(scales.inflation);
         let held_out_rms_mm = (scales.held_out_sum() / equations.readings()).sqrt() * problem.noise.likelihood_mm();
         equations.apply(&scales, &mut problem);
-        let (beta, residuals, found) = fit(&problem, equations.beta(&scales), held_out_rms_mm)?;
+        let (beta, residuals, found) = fit(&problem, equations.beta(&scales), (held_out_rms_mm, scales.inflation))?;
         let rejected = outliers::reject(&problem, &residuals);
         round += 1;
         if rejected == problem.rejected || round == MAX_ROUNDS {

@@ -169,7 +169,7 @@ pub(super) fn add(
         .collect();
     let declared: Vec<usize> =
         (0..names.len()).filter(|family| !groups.iter().any(|group| of_group(group).contains(family))).collect();
-    let mut present = (declared.clone(), equations.with_families(&declared).estimate_near(&all)?);
+    let mut present = (declared.clone(), equations.with_families(&declared).estimate_near(&all, model.near.inflation)?);
     let mut accepted: Vec<Accepted> = Vec::new();
     loop {
         let taken: usize = accepted.iter().map(|accepted| groups[accepted.group].effects.len()).sum();
@@ -182,7 +182,7 @@ pub(super) fn add(
             interrupt.check()?;
             let mut chosen: Vec<usize> = present.0.iter().chain(&families_of[k]).copied().collect();
             chosen.sort_unstable();
-            let mut scales = equations.with_families(&chosen).estimate_near(&all)?;
+            let mut scales = equations.with_families(&chosen).estimate_near(&all, model.near.inflation)?;
             // Families whose scale vanishes explain nothing.
             let weak: Vec<usize> = (chosen.iter().zip(scales.effective()))
                 .filter(|(family, effective)| families_of[k].contains(family) && **effective < MIN_EFFECTIVE)
@@ -193,7 +193,7 @@ pub(super) fn add(
             }
             if !weak.is_empty() {
                 chosen.retain(|family| !weak.contains(family));
-                scales = equations.with_families(&chosen).estimate_near(&all)?;
+                scales = equations.with_families(&chosen).estimate_near(&all, model.near.inflation)?;
             }
             if best.as_ref().is_none_or(|(_, _, best)| scales.held_out_sum() < best.held_out_sum()) {
                 best = Some((k, chosen, scales));
@@ -261,6 +261,6 @@ fn finish(
     // As in a fit of a session that declares these effects.
     let mut start = model.near.beta.clone();
     start.resize(with.parameters.list.len(), 0.0);
-    (model.problem, model.near) = with_families_linearised(with, start)?;
+    (model.problem, model.near) = with_families_linearised(with, start, model.near.inflation)?;
     Ok(())
 }

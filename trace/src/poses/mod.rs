@@ -88,6 +88,7 @@ impl PoseModel {
             beta: fit.beta.clone(),
             residuals: fit.residuals.clone(),
             held_out_rms_mm: fit.held_out.rms_mm,
+            inflation: None,
         };
         PoseModel { problem: problem.clone(), near, effects: Vec::new(), proposed: 0 }
     }
@@ -110,7 +111,7 @@ impl PoseModel {
                 beta.extend(&self.near.beta[own]);
             }
         }
-        let (problem, near) = with_families_linearised(problem, beta)?;
+        let (problem, near) = with_families_linearised(problem, beta, self.near.inflation)?;
         Ok(PoseModel { problem, near, effects, proposed: self.proposed })
     }
 }
@@ -154,7 +155,8 @@ pub(super) fn search(
         let limits = Limits { to_reach_mm: Some(chosen.fit.held_out.rms_mm), ..limits };
         let ended = groups::add(&mut without, options, false, most, interrupt).and_then(|has_groups| {
             if !has_groups {
-                (without.problem, without.near) = with_families_linearised(without.problem.clone(), fit.beta.clone())?;
+                (without.problem, without.near) =
+                    with_families_linearised(without.problem.clone(), fit.beta.clone(), None)?;
             }
             complete((problem, fit), &mut without, &library, options, false, limits, interrupt)
         });

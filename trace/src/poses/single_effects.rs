@@ -122,7 +122,7 @@ pub(super) fn add(
         let mut beta = found.near.beta.clone();
         beta.resize(with.parameters.list.len(), 0.0);
         interrupt.check()?;
-        (found.problem, found.near) = with_families_linearised(with, beta)?;
+        (found.problem, found.near) = with_families_linearised(with, beta, found.near.inflation)?;
         added += 1;
         let family = library.families.get(best.candidate.family);
         found.effects.push(AcceptedEffect {

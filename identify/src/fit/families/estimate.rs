@@ -50,15 +50,16 @@ impl FoldEquations {
         self.estimate_from(FIRST_INFLATION, Start { precisions, variance: 1.0 }, &OF_A_FIT)
     }
 
-    /// The same for a search, in fewer steps: from what the problem of the equations has, and less exactly.
+    /// The same for a search, in fewer steps: from the scales that the problem of the equations has and its inflation, and
+    /// less exactly. `None` if no inflation was estimated yet.
     ///
     /// # Errors
     /// See [`FoldEquations::estimate`].
-    pub fn estimate_near(&self, problem: &Problem) -> Result<Scales, IdentifyError> {
-        // The whitening includes the inflation of the problem.
-        let present = problem.noise.inflation;
-        let start = Start { precisions: self.precisions(problem), variance: 1.0 / present };
-        self.estimate_from(if present > 1.0 { present } else { FIRST_INFLATION }, start, &OF_A_SEARCH)
+    pub fn estimate_near(&self, problem: &Problem, inflation: Option<f64>) -> Result<Scales, IdentifyError> {
+        // An estimated inflation is part of the whitening.
+        let variance = inflation.map_or(1.0, |inflation| 1.0 / inflation);
+        let start = Start { precisions: self.precisions(problem), variance };
+        self.estimate_from(inflation.unwrap_or(FIRST_INFLATION), start, &OF_A_SEARCH)
     }
 
     fn estimate_from(&self, inflation: f64, start: Start, to: &Tolerances) -> Result<Scales, IdentifyError> {
