@@ -4,7 +4,7 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::effect::Shape;
-use abbe_model::instrument::channel;
+use abbe_model::instrument::channel::{self, Channel};
 
 use crate::coefficient::Coefficient;
 use crate::error::CodegenError;
@@ -39,6 +39,8 @@ pub struct Equation {
     pub outputs: Vec<Operand>,
     /// The name of each: x, y, z of a vector, or the channel.
     pub names: Vec<&'static str>,
+    /// The unit of each, mm or rad.
+    pub units: Vec<&'static str>,
     /// The requested form.
     pub form: Form,
     /// The name of the test, if it has one.
@@ -116,11 +118,12 @@ impl Equation {
             Order::First => truncation::first(&run, &exact, &mut vectors, &written)?,
         };
         let stated_length = run.subject.bar().map(|bar| bar.bar.operand());
-        let names = match run.subject.station().map(|station| station.map(|_| 0.0_f64)) {
+        let (names, units) = match run.subject.station().map(|station| station.map(|_| 0.0_f64)) {
             Some(station) if !channel::are_vector(station.channels()) => {
-                station.channels().iter().map(|channel| channel.name).collect()
+                let unit = |channel: &Channel| if channel.is_angle() { "rad" } else { "mm" };
+                station.channels().iter().map(|channel| (channel.name, unit(channel))).unzip()
             }
-            _ => vec!["x", "y", "z"],
+            _ => (vec!["x", "y", "z"], vec!["mm"; 3]),
         };
         let touch = run.probe_geometry().map(|geometry| match vectors.as_slice() {
             [.., stylus, step] if options.order == Order::Bilinear => {
@@ -151,6 +154,7 @@ impl Equation {
             driven_errors,
             stated_length,
             names,
+            units,
             bar_parameters,
             touch,
             whole,

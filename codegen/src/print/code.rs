@@ -250,21 +250,28 @@ impl<'e> Code<'e> {
             Kind::Length => "the length read, mm".to_string(),
             Kind::Distance => "the distance to the surface along the probing direction, mm".to_string(),
             Kind::Coordinates if equation.names == ["x", "y", "z"] => "the three coordinates read, mm".to_string(),
-            Kind::Coordinates => format!("{}; lengths in mm, angles in rad", equation.names.join(", ")),
+            Kind::Coordinates => {
+                let read = equation.names.iter().zip(&equation.units).map(|(name, unit)| format!("{name} in {unit}"));
+                read.collect::<Vec<_>>().join(", ")
+            }
             Kind::Volumetric => "the error vector x, y, z, mm".to_string(),
         };
-        lines.push(if self.arguments.is_empty() {
-            let (first, second) = (at("errors", 0), at("errors", 1));
-            format!("Value: {what}. Gradient: by {first}, {second} and so on, mm/mm and mm/rad.")
-        } else {
-            format!("Value: {what}. Gradient: by the errors in their order, mm/mm and mm/rad.")
-        });
+        let by = match self.arguments.is_empty() {
+            true => format!("{}, {} and so on", at("errors", 0), at("errors", 1)),
+            false => "the errors in their order".to_string(),
+        };
+        let unit = match equation.kind == Kind::Coordinates && equation.units.contains(&"rad") {
+            true => "in the unit of the value per mm and per rad",
+            false => "mm/mm and mm/rad",
+        };
+        lines.push(format!("Value: {what}. Gradient: by {by}, {unit}."));
         let operations = self.program.operations();
         let functions = match operations.functions {
             0 => String::new(),
             some if equation.options.effects.is_empty() => {
                 format!(", and {some} sines and cosines of errors")
             }
+            1 => ", and 1 function of errors or drivers".to_string(),
             some => format!(", and {some} functions of errors and drivers"),
         };
         let with = if self.program.outputs.len() > self.outputs() { "Value and gradient" } else { "Value" };

@@ -254,6 +254,34 @@ fn the_reading_of_a_probe_in_every_language() {
     );
 }
 
+/// Each channel has its own unit, and so has its gradient.
+#[test]
+fn code_names_the_channels_of_an_instrument_with_their_units() {
+    for (session, test, values) in [
+        (
+            "r-test/plan.toml",
+            "BK1",
+            "the three coordinates read, mm. Gradient: by the errors in their order, mm/mm and mm/rad.",
+        ),
+        ("distance/session.toml", "S1", "distance in mm. Gradient: by the errors in their order, mm/mm and mm/rad."),
+        (
+            "angle/session.toml",
+            "polygon",
+            "angle in rad. Gradient: by the errors in their order, in the unit of the value per mm and per rad.",
+        ),
+        ("laser/session.toml", "LX", "displacement in mm, vertical in mm, pitch in rad. Gradient: by the errors"),
+        (
+            "pose/session.toml",
+            "body",
+            "x in mm, y in mm, z in mm, rx in rad, ry in rad, rz in rad. Gradient: by the errors",
+        ),
+        ("pose/tracker.toml", "target", "range in mm, across in rad, up in rad. Gradient"),
+    ] {
+        let page = printed(&["equation", text(&ready(session)), "--test", test, "--as", "c"]);
+        assert!(page.contains(&format!("* Value: {values}")), "{session}: {page}");
+    }
+}
+
 #[test]
 fn invalid_requests_are_refused_with_the_reason() {
     let (plan, machine) = (plan(), machine());
