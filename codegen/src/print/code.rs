@@ -266,13 +266,12 @@ impl<'e> Code<'e> {
         };
         lines.push(format!("Value: {what}. Gradient: by {by}, {unit}."));
         let operations = self.program.operations();
-        let functions = match operations.functions {
-            0 => String::new(),
-            some if equation.options.effects.is_empty() => {
-                format!(", and {some} sines and cosines of errors")
-            }
-            1 => ", and 1 function of errors or drivers".to_string(),
-            some => format!(", and {some} functions of errors and drivers"),
+        let functions = match (operations.functions, equation.options.effects.is_empty()) {
+            (0, _) => String::new(),
+            (1, true) => ", and 1 sine or cosine of an error".to_string(),
+            (some, true) => format!(", and {some} sines and cosines of errors"),
+            (1, false) => ", and 1 function of an error or driver".to_string(),
+            (some, false) => format!(", and {some} functions of errors and drivers"),
         };
         let with = if self.program.outputs.len() > self.outputs() { "Value and gradient" } else { "Value" };
         lines.push(format!(
