@@ -109,11 +109,11 @@ pub fn nearest_of<'p>(point: &[f64], others: impl Iterator<Item = (usize, &'p [f
     for (place, other) in others {
         // Most points are further away already by the first coordinates.
         let mut distance = 0.0;
-        let is_nearer = point.chunks(COORDINATES_AT_ONCE).zip(other.chunks(COORDINATES_AT_ONCE)).all(|(a, b)| {
+        let may_be_nearer = point.chunks(COORDINATES_AT_ONCE).zip(other.chunks(COORDINATES_AT_ONCE)).all(|(a, b)| {
             distance = a.iter().zip(b).fold(distance, |sum, (a, b)| sum + (a - b).powi(2));
             distance < nearest.1
         });
-        if is_nearer {
+        if may_be_nearer && distance < nearest.1 {
             nearest = (Some(place), distance);
         }
     }
@@ -252,6 +252,8 @@ mod tests {
         let twice = [(7, &points[0][..]), (4, &points[1][..]), (2, &points[1][..])];
         assert_eq!(nearest_of(&points[1], twice.into_iter()), Some(4));
         assert_eq!(nearest_of(&points[1], std::iter::empty()), None);
+        // Of an axis that does not move there is no coordinate.
+        assert_eq!(nearest_of(&[], [(3, &[][..]), (5, &[][..])].into_iter()), Some(3));
     }
 
     #[test]
