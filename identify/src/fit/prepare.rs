@@ -191,6 +191,7 @@ fn settled(mut problem: Problem, stated: bool, floor: f64) -> Result<(Problem, F
 fn with_families(problem: Problem, start: Vec<f64>) -> Result<(Problem, Fit), IdentifyError> {
     // With hundreds of parameters the iterations of a fit take most of the time. The outliers settle without them.
     let (problem, near) = with_families_linearised(problem, start, None)?;
+    // From nothing, so that the scales do not depend on what a search has tried.
     let estimate = |equations: &FoldEquations, _: &Problem, _: Option<f64>| equations.estimate();
     in_turn_with_families(problem, near.beta, None, estimate, |problem, beta, _| {
         let fit = super::fit(problem, Some(&beta))?;
@@ -222,10 +223,11 @@ pub fn with_families_linearised(
     inflation: Option<f64>,
 ) -> Result<(Problem, NearMinimum), IdentifyError> {
     let has_families = !families(&problem.parameters).is_empty();
-    in_turn_with_families(problem, start, inflation, FoldEquations::estimate_near, |problem, beta, found| {
+    let estimate = FoldEquations::estimate_near;
+    in_turn_with_families(problem, start, inflation, estimate, |problem, beta, (held_out_rms_mm, inflation)| {
         let beta = super::identifiable(problem, &beta)?;
         let residuals = problem.residuals(&beta);
-        let (held_out_rms_mm, inflation) = (found.0, has_families.then_some(found.1));
+        let inflation = has_families.then_some(inflation);
         Ok((beta.clone(), residuals.clone(), NearMinimum { beta, residuals, held_out_rms_mm, inflation }))
     })
 }

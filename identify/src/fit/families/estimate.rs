@@ -51,7 +51,7 @@ impl FoldEquations {
     }
 
     /// The same for a search, in fewer steps: from the scales that the problem of the equations has and its inflation, and
-    /// less exactly. `None` if no inflation was estimated yet.
+    /// less exactly. Before the first estimate there is no inflation.
     ///
     /// # Errors
     /// See [`FoldEquations::estimate`].
