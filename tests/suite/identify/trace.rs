@@ -2,6 +2,7 @@
 //! effects are in other files or in the literature.
 
 use abbe::files::{self, ReadOptions};
+use abbe::identify::fit::prepare;
 use abbe::identify::model_file::{IdentifiedModel, Provenance};
 use abbe::identify::results::TraceVerdict;
 use abbe::identify::results::{EffectName, TraceResult};
@@ -201,6 +202,17 @@ fn ur10_has_a_curve_of_each_joint_and_compliances() {
     let [extrapolation, interpolation] = held_out(result);
     println!("UR10 with {} effects: {extrapolation:.4} mm, {interpolation:.4} mm", result.effects.len());
     assert!(extrapolation <= 0.18 && interpolation <= 0.10, "{extrapolation} {interpolation}");
+
+    // A session that declares the effects has the same outliers, scales and estimates, whatever the search did before.
+    let mut declared = session.clone();
+    declared.effects.extend(outcome.effects.iter().cloned());
+    let (problem, fit) = prepare(&declared, options.seed).unwrap();
+    assert_eq!(problem.rejected, outcome.after.rejected);
+    assert!((problem.noise.inflation / outcome.after.noise.inflation - 1.0).abs() < 1e-9);
+    for ((a, b), size) in fit.beta.iter().zip(&outcome.after_fit.beta).zip(problem.parameters.sizes()) {
+        assert!((a - b).abs() <= 1e-9 * size, "{a} {b}");
+    }
+    assert_eq!(fit.beta.len(), outcome.after_fit.beta.len());
 
     // Series B was not used for fitting, choosing or tuning.
     let model = IdentifiedModel::of_fit(&outcome.after, &outcome.after_fit, Provenance::default()).unwrap();

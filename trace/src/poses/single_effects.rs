@@ -149,6 +149,7 @@ pub(super) fn add(
 }
 
 /// The candidates with a gain in a residual.
+#[derive(Default)]
 struct Scored {
     /// Candidates other than the accepted effects, the largest score first.
     best: Vec<usize>,
@@ -160,18 +161,17 @@ struct Scored {
 fn ranked(library: &Library<'_>, found: &PoseModel, interrupt: Interrupt<'_>) -> Result<Scored, IdentifyError> {
     let residuals = std::slice::from_ref(&found.near.residuals);
     let mut of_residuals = scored(library, &found.effects, residuals, interrupt)?;
-    let mut ranked = of_residuals.pop().unwrap_or(Scored { best: Vec::new(), detectable: 0 });
+    let Scored { best, detectable } = of_residuals.pop().unwrap_or_default();
     // One for each component and driver, so that the neighbouring orders of one cause do not take all places.
     let mut kinds: Vec<(String, Driver)> = Vec::new();
-    ranked.best.retain(|k| {
+    let mut is_new = |k: &usize| {
         let effect = &library.candidates[*k].effect;
         let kind = (effect.component.to_string(), effect.driver.clone());
         let new = !kinds.contains(&kind);
         kinds.push(kind);
         new
-    });
-    ranked.best.truncate(LINES_TRIED);
-    Ok(ranked)
+    };
+    Ok(Scored { best: best.into_iter().filter(|k| is_new(k)).take(LINES_TRIED).collect(), detectable })
 }
 
 /// The candidates with a gain in each of some residuals.
