@@ -4,11 +4,14 @@
 //! Structure in the residual must not be excluded. Along a run a residual is therefore compared with the medians of its
 //! neighbours on either side, not with zero (Hampel's identifier: Davies & Gather, J. Am. Stat. Assoc. 88 (1993) 782).
 //! A deviation that returns in the repeats of the reading is structure too: a spike after every reversal.
+//! A run of few readings has too few neighbours for a median. There a reading is compared with its repeats, less what all
+//! readings of the run differ from theirs.
 //! In the residual of a circle's own diagnosis, which contains all structure, it is compared with zero and with both
 //! neighbours. Poses have no neighbours. A pose is an outlier if its residual is a large multiple of the median
 //! residual.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use abbe_model::session::readings::Readings;
 
@@ -18,6 +21,9 @@ use crate::problem::Problem;
 
 /// Number of neighbours on either side in the median.
 const NEIGHBOURS: usize = 5;
+/// Least number of readings of a short run with repeats, and of differences of repeats in all short runs of a test.
+const MIN_REPEATED: usize = 4;
+const MIN_DIFFERENCES: usize = 12;
 /// Limit along a run, in robust standard deviations: exceeded once in 10⁷ Gaussian readings.
 const OUTLIER_ALONG_RUN: f64 = 5.3;
 /// Limit for a pose, in median residual lengths: exceeded once in 10⁹ Gaussian poses of three coordinates. Unmodelled
@@ -53,24 +59,21 @@ pub fn reject(problem: &Problem, residuals: &[Vec<f64>]) -> Vec<Vec<bool>> {
 /// The outliers in the residual of a model that contains all structure, by index: large beside both neighbours too.
 pub(crate) fn alone(residual: &[f64]) -> impl Iterator<Item = usize> {
     let limit = OUTLIER_ALONE * robust_deviation(residual);
-    let is_small = move |place: Option<usize>, value: f64| {
-        place.and_then(|place| residual.get(place)).is_none_or(|other| other.abs() < 0.5 * value)
-    };
-    (0..residual.len()).filter(move |&i| {
-        let value = residual[i].abs();
-        value > limit && is_small(i.checked_sub(1), value) && is_small(Some(i + 1), value)
-    })
+    (0..residual.len()).filter(move |&i| residual[i].abs() > limit && is_isolated(residual, i))
 }
 
 fn reject_along_runs(readings: &Readings, residual: &[f64], channels: usize, sigma_mm: f64) -> Vec<bool> {
     let mut reject = vec![false; readings.rows()];
+    let (long, short): (Vec<_>, Vec<_>) = readings.runs().into_iter().partition(|run| run.len() > 2 * NEIGHBOURS);
     for channel in 0..channels {
+        let read =
+            |run: &Range<usize>| -> Vec<usize> { run.clone().filter(|row| readings.was_read(*row, channel)).collect() };
+        let value = |row: usize| residual[row * channels + channel];
         // The deviation of each reading from its neighbours, and the limits that single readings exceed.
         let mut deviations = vec![0.0; readings.rows()];
         let mut conspicuous = Vec::new();
-        for run in readings.runs().into_iter().filter(|run| run.len() > 2 * NEIGHBOURS) {
-            let rows: Vec<usize> = run.filter(|row| readings.was_read(*row, channel)).collect();
-            let values: Vec<f64> = rows.iter().map(|row| residual[row * channels + channel]).collect();
+        for rows in long.iter().map(read) {
+            let values: Vec<f64> = rows.iter().map(|row| value(*row)).collect();
             let of_run = deviations_from_neighbours(&values);
             let limit = OUTLIER_ALONG_RUN * robust_deviation(&of_run).max(sigma_mm);
             for (row, deviation) in rows.into_iter().zip(of_run) {
@@ -82,8 +85,88 @@ fn reject_along_runs(readings: &Readings, residual: &[f64], channels: usize, sig
         }
         retain_unrepeated(&mut conspicuous, readings, &deviations);
         conspicuous.into_iter().for_each(|(row, _)| reject[row] = true);
+        let short: Vec<Vec<usize>> = short.iter().map(read).collect();
+        in_short_runs(readings, &short, value, sigma_mm).into_iter().for_each(|row| reject[row] = true);
     }
     reject
+}
+
+/// The outliers among the rows of short runs: readings that differ from their repeats while their neighbours agree with
+/// theirs.
+fn in_short_runs(readings: &Readings, runs: &[Vec<usize>], value: impl Fn(usize) -> f64, sigma_mm: f64) -> Vec<usize> {
+    if runs.is_empty() {
+        return Vec::new();
+    }
+    let keys = RepeatKeys::of(readings);
+    // The place of each row: its run, and its number in the run.
+    let mut repeats: HashMap<&[i64], Vec<(usize, usize)>> = HashMap::new();
+    for (run, rows) in runs.iter().enumerate() {
+        for (place, row) in rows.iter().enumerate() {
+            repeats.entry(keys.of_row(*row)).or_default().push((run, place));
+        }
+    }
+    let differences: Vec<Vec<f64>> = runs
+        .iter()
+        .map(|rows| {
+            let from_repeats = |row: &usize| {
+                let others = repeats[keys.of_row(*row)].iter().map(|(run, place)| runs[*run][*place]);
+                let mut others: Vec<f64> = others.filter(|other| other != row).map(&value).collect();
+                match others[..] {
+                    [] => None,
+                    [one, other] => Some(value(*row) - 0.5 * (one + other)),
+                    _ => Some(value(*row) - median(&mut others)),
+                }
+            };
+            let of_run: Vec<Option<f64>> = rows.iter().map(from_repeats).collect();
+            let mut known: Vec<f64> = of_run.iter().flatten().copied().collect();
+            // The run as a whole may differ from its repeats, as by a drift.
+            let level = if known.len() >= MIN_REPEATED { median(&mut known) } else { f64::NAN };
+            of_run.into_iter().map(|difference| difference.map_or(f64::NAN, |difference| difference - level)).collect()
+        })
+        .collect();
+    let known: Vec<f64> = differences.iter().flatten().copied().filter(|difference| !difference.is_nan()).collect();
+    if known.len() < MIN_DIFFERENCES {
+        return Vec::new();
+    }
+    let limit = OUTLIER_ALONG_RUN * robust_deviation(&known).max(sigma_mm);
+    let bend = |&(run, place): &(usize, usize)| {
+        let values: Vec<f64> = runs[run].iter().map(|row| value(*row)).collect();
+        beside_line(&values, place).abs()
+    };
+    let is_worst = |place: &(usize, usize)| {
+        let size = |(run, place): &(usize, usize)| differences[*run][*place].abs();
+        match &repeats[keys.of_row(runs[place.0][place.1])][..] {
+            // The two differ from each other by the same. The outlier is the one that its neighbours contradict; if they
+            // contradict both, either may be it.
+            [one, other] => bend(place) >= 0.5 * bend(if one == place { other } else { one }),
+            all => all.iter().all(|other| size(other).is_nan() || size(other) <= size(place)),
+        }
+    };
+    let places = (0..runs.len()).flat_map(|run| (0..runs[run].len()).map(move |place| (run, place)));
+    let outliers = places.filter(|(run, place)| {
+        differences[*run][*place].abs() > limit && is_isolated(&differences[*run], *place) && is_worst(&(*run, *place))
+    });
+    outliers.map(|(run, place)| runs[run][place]).collect()
+}
+
+/// Whether both neighbours of a value are less than half as large. An end of the list has one; NaN counts as none.
+fn is_isolated(values: &[f64], place: usize) -> bool {
+    let size = values[place].abs();
+    let is_small = |place: Option<usize>| {
+        place.and_then(|place| values.get(place)).is_none_or(|other| other.is_nan() || other.abs() < 0.5 * size)
+    };
+    is_small(place.checked_sub(1)) && is_small(Some(place + 1))
+}
+
+/// The deviation of a value from the line through the values on either side, or at an end through the next two.
+fn beside_line(values: &[f64], place: usize) -> f64 {
+    let at = |place: usize| values.get(place).copied();
+    let line = match place {
+        0 => at(1).zip(at(2)).map(|(near, far)| 2.0 * near - far),
+        last if last + 1 == values.len() => place.checked_sub(2).map(|far| 2.0 * values[place - 1] - values[far]),
+        _ => Some(0.5 * (values[place - 1] + values[place + 1])),
+    };
+    line.map_or(0.0, |line| values[place] - line)
 }
 
 /// The deviation of each value of a run from the medians of its neighbours: the lesser of the two.
@@ -94,7 +177,7 @@ fn deviations_from_neighbours(values: &[f64]) -> Vec<f64> {
         // neither.
         let start = row.saturating_sub(NEIGHBOURS);
         let end = (row + NEIGHBOURS + 1).min(values.len());
-        let from = |side: std::ops::Range<usize>| match side.len() {
+        let from = |side: Range<usize>| match side.len() {
             0..3 => None,
             NEIGHBOURS => Some(value - middle[side.start]),
             _ => Some(value - median(&mut values[side].to_vec())),
@@ -205,6 +288,47 @@ mod tests {
         residual[0] += 0.01;
         residual[59] += 0.01;
         assert_eq!(rejected(&residual), [0, 59]);
+    }
+
+    /// Runs of six readings to and fro over a residual with structure, each direction twice or thrice. A reading is an
+    /// outlier where its repeats contradict it; of two, the one that its neighbours contradict too. A spike that returns,
+    /// a shift of a whole run and a step within one are structure.
+    #[test]
+    fn repeats_show_the_outliers_of_short_runs() {
+        const PLACES: usize = 6;
+        for runs in [4, 6] {
+            let rows = runs * PLACES;
+            let place = |row: usize| match (row / PLACES) % 2 {
+                0 => row % PLACES,
+                _ => PLACES - 1 - row % PLACES,
+            };
+            let readings = Readings {
+                positions: vec![(0..rows).map(|row| place(row) as f64).collect()],
+                run: (0..rows).map(|row| (row / PLACES) as i64).collect(),
+                channels: 1,
+                ..Readings::default()
+            };
+            let noise = |row: usize| 1e-4 * (((row * 7) % 11) as f64 - 5.0);
+            let structure = |row: usize| if place(row) == 2 { 0.006 } else { 1e-3 * (place(row) as f64).sin() };
+            let residual = |changed: &[(usize, f64)]| -> Vec<f64> {
+                let change = |row: usize| changed.iter().filter(|c| c.0 == row).map(|c| c.1).sum::<f64>();
+                (0..rows).map(|row| noise(row) + structure(row) + change(row)).collect()
+            };
+            let rejected = |changed: &[(usize, f64)]| -> Vec<usize> {
+                let rejected = reject_along_runs(&readings, &residual(changed), 1, 3e-4);
+                (0..rows).filter(|row| rejected[*row]).collect()
+            };
+            assert_eq!(rejected(&[]), [0; 0]);
+            for row in 0..rows {
+                assert!(rejected(&[(row, 0.02)]).contains(&row), "{row} of {runs} runs");
+                let others = rejected(&[(row, 0.02)]).into_iter().filter(|other| *other != row).count();
+                assert_eq!(others, 0, "{row} of {runs} runs: {:?}", rejected(&[(row, 0.02)]));
+            }
+            assert_eq!(rejected(&[(3, 0.02), (PLACES + 1, -0.01)]), [3, PLACES + 1]);
+            let shifted: Vec<(usize, f64)> = (0..PLACES).map(|row| (row, 0.01)).collect();
+            assert_eq!(rejected(&shifted), [0; 0]);
+            assert_eq!(rejected(&shifted[3..]), [0; 0]);
+        }
     }
 
     #[test]
