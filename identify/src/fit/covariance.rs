@@ -4,7 +4,7 @@ use faer::Mat;
 
 use super::Fit;
 use super::cover::add_to_covariance;
-use super::quantities::{Quantity, quantities, rms_of_waves, values_at};
+use super::quantities::{Quantity, quantities, slopes_of_rms, values_at};
 use crate::numerics::rank::Rank;
 use crate::problem::Problem;
 use crate::results::{Covariance, NullSpace, ParameterResult};
@@ -19,9 +19,9 @@ pub fn of_parameters(problem: &Problem, fit: &Fit, parameters: &[ParameterResult
         match quantity {
             Quantity::Parameter(j) => rows.push(vec![(j, list[j].unit.display_per_internal)]),
             Quantity::Rms(j, count) => {
-                let rms = rms_of_waves(&fit.beta[j..j + count]).max(f64::MIN_POSITIVE);
                 let display = list[j].unit.display_per_internal;
-                rows.push((j..j + count).map(|k| (k, 0.5 * fit.beta[k] / rms * display)).collect());
+                let slopes = slopes_of_rms(&fit.beta[j..j + count]).map(|slope| slope * display);
+                rows.push((j..).zip(slopes).collect());
             }
             Quantity::Harmonic(j) => {
                 let (a, b) = (fit.beta[j], fit.beta[j + 1]);

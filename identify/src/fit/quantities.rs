@@ -24,6 +24,12 @@ pub(crate) fn rms_of_waves(coefficients: &[f64]) -> f64 {
     (0.5 * coefficients.iter().map(|c| c * c).sum::<f64>()).sqrt()
 }
 
+/// The derivative of [`rms_of_waves`] by each coefficient.
+pub(crate) fn slopes_of_rms(coefficients: &[f64]) -> impl Iterator<Item = f64> {
+    let rms = rms_of_waves(coefficients).max(f64::MIN_POSITIVE);
+    coefficients.iter().map(move |c| 0.5 * c / rms)
+}
+
 /// Standard uncertainty of an undetermined phase, °: the standard deviation of a uniform distribution over one turn.
 pub(crate) fn u_of_undetermined_phase_deg() -> f64 {
     180.0 / 3.0_f64.sqrt()
@@ -146,5 +152,21 @@ mod tests {
             assert!((values[place] - 3.0).abs() < 1e-12, "{}", values[place]);
             assert!((values[place + 1] - other_deg).abs() < 1e-9, "{} and {other_deg}", values[place + 1]);
         }
+    }
+
+    /// `3 cos + 4 sin` has the rms `5/√2`.
+    #[test]
+    fn slopes_are_central_differences_of_the_rms() {
+        assert!((rms_of_waves(&[3.0, 4.0]) - 5.0 / 2.0_f64.sqrt()).abs() < 1e-15);
+        let waves = [3.0, -4.0, 0.5, 0.0];
+        for (k, slope) in slopes_of_rms(&waves).enumerate() {
+            let at = |change: f64| {
+                let mut changed = waves;
+                changed[k] += change;
+                rms_of_waves(&changed)
+            };
+            assert!((slope - (at(1e-5) - at(-1e-5)) / 2e-5).abs() < 1e-9, "{k}: {slope}");
+        }
+        assert!(slopes_of_rms(&[0.0; 2]).all(|slope| slope == 0.0));
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use abbe_model::effect::description::meaning;
 
 use super::outcome::{self, Determined};
-use super::quantities::{Quantity, quantities, rms_of_waves, u_of_undetermined_phase_deg};
+use super::quantities::{Quantity, quantities, rms_of_waves, slopes_of_rms, u_of_undetermined_phase_deg};
 use super::{Fit, StepPosition, covariance, enlargement_warning};
 use super::{assume, cover};
 use crate::circular;
@@ -155,11 +155,11 @@ fn position(problem: &Problem, position: &StepPosition) -> ParameterResult {
 /// The rms of a spectrum over a period, with the uncertainty by propagation.
 fn rms_of_spectrum(problem: &Problem, fit: &Fit, first: usize, count: usize) -> ParameterResult {
     let parameter = &problem.parameters.list[first];
-    let rms = rms_of_waves(&fit.beta[first..first + count]);
-    let along = |j: usize| 0.5 * fit.beta[j] / rms.max(f64::MIN_POSITIVE);
-    let own = first..first + count;
-    let products = own.clone().flat_map(|j| own.clone().map(move |k| (j, k)));
-    let variance: f64 = products.map(|(j, k)| along(j) * along(k) * fit.covariance[(j, k)]).sum();
+    let own = &fit.beta[first..first + count];
+    let rms = rms_of_waves(own);
+    let slopes: Vec<(usize, f64)> = (first..).zip(slopes_of_rms(own)).collect();
+    let products = slopes.iter().flat_map(|(j, a)| slopes.iter().map(move |(k, b)| a * b * fit.covariance[(*j, *k)]));
+    let variance: f64 = products.sum();
     let display = parameter.unit.display_per_internal;
     let u = variance.max(0.0).sqrt() * fit.u_enlargement * display;
     let id = parameter.id.trim_end_matches("cos1");
