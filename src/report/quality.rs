@@ -151,7 +151,7 @@ pub fn noise(noise_um: f64, unit: ReadingUnit, source: NoiseSource) -> String {
 pub fn noise_sentence(noise_um: f64, unit: ReadingUnit, source: NoiseSource) -> String {
     match source {
         NoiseSource::Residual => format!(
-            "No noise is stated and there are no repeated readings. The uncertainties follow from the residual of the model, {}",
+            "No noise is stated or follows from repeats. The uncertainties follow from the residual of the model, {}",
             of_readings(noise_um, unit)
         ),
         other => format!("Noise standard deviation {} ({other})", of_readings(noise_um, unit)),
@@ -163,7 +163,7 @@ pub fn agreement(goodness: Goodness, degrees_of_freedom: usize) -> String {
     let figures = format!("χ²/ν = {:.2}, ν = {degrees_of_freedom}", goodness.chi_square_ratio);
     match goodness.verdict {
         GoodnessVerdict::NotJudged => {
-            "cannot be judged: no noise is stated and no reading repeats, so the residual is taken for noise"
+            "cannot be judged: no noise is stated or follows from repeats, so the residual is taken for noise"
                 .to_string()
         }
         GoodnessVerdict::Exceeds => format!("the residual exceeds the noise ({figures}): the model lacks an effect"),

@@ -132,7 +132,7 @@ fn verdict(result: &TraceResult) -> String {
             format!("{subject} a part of the residual of the declared model: {found}. {}", remains(result))
         }
         TraceVerdict::NotJudged => format!(
-            "{} No noise is stated and no reading repeats, so that whether the remaining residual is noise cannot be judged.",
+            "{} No noise is stated or follows from repeats, so that whether the remaining residual is noise cannot be judged.",
             match result.effects.len() {
                 0 => "The search finds no effect.".to_string(),
                 _ => format!("{subject} a part of the residual of the declared model: {found}."),

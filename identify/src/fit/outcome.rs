@@ -162,7 +162,7 @@ fn noise(problem: &Problem, fit: &Fit) -> Assumption {
         (_, None) => (
             format!("{figure}, from the residual of the model"),
             AssumptionVerdict::NotTested,
-            "no noise is stated and no reading repeats".to_string(),
+            "no noise is stated or follows from repeats".to_string(),
         ),
     };
     Assumption { kind: AssumptionKind::Noise, statement, verdict, test }

@@ -20,7 +20,7 @@ pub enum GoodnessVerdict {
     Exceeds,
     /// χ²/ν does not exceed 1 significantly, but the residual has structure: the model lacks an effect.
     Structured,
-    /// It cannot be judged: no noise is stated and no reading repeats, so that the residual is taken for noise.
+    /// It cannot be judged: no noise is stated or follows from repeats, so that the residual is taken for noise.
     #[default]
     NotJudged,
 }
@@ -53,7 +53,7 @@ impl GoodnessVerdict {
                 Some("the residual has structure: the model lacks an effect, which the uncertainty does not cover")
             }
             GoodnessVerdict::NotJudged => Some(
-                "no noise is stated and no reading repeats: whether the model lacks an effect cannot be judged; state \
+                "no noise is stated or follows from repeats: whether the model lacks an effect cannot be judged; state \
                  `noise_um` or repeat a run",
             ),
         }
