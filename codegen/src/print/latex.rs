@@ -165,11 +165,8 @@ fn escape(text: &str) -> String {
     while let Some(character) = characters.next() {
         match character {
             // An identifier breaks behind its parts.
-            '_' | '~' => escaped.push_str(if character == '_' {
-                "\\_\\allowbreak{}"
-            } else {
-                "\\textasciitilde{}\\allowbreak{}"
-            }),
+            '_' => escaped.push_str("\\_\\allowbreak{}"),
+            '~' => escaped.push_str("\\textasciitilde{}\\allowbreak{}"),
             ':' | '.' if characters.peek().is_some_and(|next| next.is_alphabetic()) => {
                 escaped.extend([character]);
                 escaped.push_str("\\allowbreak{}");
@@ -188,4 +185,23 @@ fn escape(text: &str) -> String {
         }
     }
     escaped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What TeX would read as a command, a comment or a space is printed as it is.
+    #[test]
+    fn special_characters_are_printed_as_they_are() {
+        for (text, tex) in [
+            ("EX0C~C", "EX0C\\textasciitilde{}\\allowbreak{}C"),
+            ("ball_x", "ball\\_\\allowbreak{}x"),
+            ("A.x at 0.5", "A.\\allowbreak{}x at 0.5"),
+            ("5 % & #1 {$}", "5 \\% \\& \\#1 \\{\\$\\}"),
+            ("\\", "\\textbackslash{}"),
+        ] {
+            assert_eq!(escape(text), tex);
+        }
+    }
 }
