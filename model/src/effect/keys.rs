@@ -210,3 +210,28 @@ impl KeyWriter {
         self.entries
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Positions are degrees if all read back to the same bits, and radians if one does not.
+    #[test]
+    fn quantities_are_degrees_if_they_read_back() {
+        let unit = DriverUnit::new("deg", "rad", "deg", "°");
+        let key = Key { name: "at", form: KeyForm::Quantities, meaning: "positions" };
+        let written = |values: &[f64]| {
+            let mut writer = KeyWriter::new(unit);
+            writer.quantities(&key, values);
+            let found = writer.finish();
+            let numbers = |node: &Node| node.items().iter().filter_map(Node::as_number).collect::<Vec<f64>>();
+            (found.get("at_deg").map(numbers), found.get("at_rad").map(numbers))
+        };
+        let exact = [30.0_f64.to_radians(), -12.5_f64.to_radians()];
+        assert_eq!(written(&exact), (Some(vec![30.0, -12.5]), None));
+        // No number of degrees near it is this one.
+        let no_degrees = (1..10_000).map(|k| 1e-3 * f64::from(k)).find(|x| unit.exact(*x).0 == "rad").unwrap();
+        assert_eq!(written(&[no_degrees]), (None, Some(vec![no_degrees])));
+        assert_eq!(written(&[exact[0], no_degrees]), (None, Some(vec![exact[0], no_degrees])));
+    }
+}

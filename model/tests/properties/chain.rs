@@ -199,6 +199,21 @@ proptest! {
         }
     }
 
+    /// The axis on the bed on either side: `d · ((p − o) × g)` with the point of its own side.
+    #[test]
+    fn the_axes_on_the_bed_carry_the_points_of_their_sides(drawn in machines(), at in point()) {
+        let machine = &drawn.machine;
+        let [table, tool] = both(&drawn, 0.0, at, at);
+        let (of_table, of_tool) = (machine.workpiece_side.checked_sub(1), machine.workpiece_side);
+        for (index, carried) in of_table.map(|index| (index, table)).into_iter().chain([(of_tool, tool)]) {
+            let Some(axis) = machine.axes.get(index) else { continue };
+            let lever = Vector3::from(carried) - Vector3::from(axis.origin_mm);
+            let moment = Vector3::from(axis.direction).dot(&lever.cross(&Vector3::from(machine.gravity)));
+            let found = machine.gravity_moment_mm(index, &drawn.state(), at);
+            prop_assert!((found - moment).abs() < 1e-8, "{index}: {found} {moment}");
+        }
+    }
+
     #[test]
     fn an_axis_without_motion_and_errors_has_no_effect(drawn in machines(), table in point()) {
         let (state, bodies) = (drawn.state(), drawn.bodies(0.0));

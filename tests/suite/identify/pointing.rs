@@ -158,6 +158,23 @@ fn large_errors_of_a_mount_are_those_of_rotation_matrices() {
     }
 }
 
+/// A tube that bends by 20″ cos E, and by 15″ cot E: the line of sight points lower than the encoder says, and the terms are
+/// positive.
+#[test]
+fn a_bending_tube_is_a_positive_term() {
+    for (name, shape, arcsec, power) in [("TF", "cosine\"\norder = 1", 20.0, 0), ("TX", "cotangent\"", 15.0, 1)] {
+        let bend = |e: f64| arcsec * e.cos() / e.sin().powi(power);
+        let sight = |at: [f64; 2]| [at[0], at[1], at[0], at[1] - bend(at[1].to_radians()) / 3600.0];
+        let stars: Vec<[f64; 4]> = positions().into_iter().map(sight).collect();
+        let folder = tempfile::tempdir().unwrap();
+        let effect = format!("[[effect]]\ncomponent = \"EBEL\"\ndriver = \"EL\"\nshape = \"{shape}\n");
+        let session = simulated(folder.path(), &stars, &format!("noise_arcsec = 0.1\n{effect}"));
+        let found = terms(&session);
+        let own = term(&found, name).value_arcsec.unwrap();
+        assert!((own - arcsec).abs() < 0.01, "{name}: {own}");
+    }
+}
+
 /// The index error of the elevation and a line of sight that is high have one column: neither has a value, their sum does.
 #[test]
 fn a_term_of_confounded_parameters_is_their_sum() {
