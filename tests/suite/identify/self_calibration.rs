@@ -36,6 +36,11 @@ const CELL: f64 = 0.35;
 
 /// The ready plan with `count` angles and test 1b at `second_deg`.
 fn plan(count: usize, second_deg: f64) -> Session {
+    plan_on(count, second_deg, |machine| machine)
+}
+
+/// The same on a changed machine.
+fn plan_on(count: usize, second_deg: f64, change: impl Fn(String) -> String) -> Session {
     let original = std::fs::read_to_string(ready("self-calibration/session.toml")).unwrap();
     let step = 360.0 / count as f64;
     let (sin, cos) = second_deg.to_radians().sin_cos();
@@ -47,7 +52,8 @@ fn plan(count: usize, second_deg: f64) -> Session {
             &format!("x_mm = \"R * {cos:.15}\", y_mm = \"R * {sin:.15}\"").replace("* -", "* (0 - 1) * "),
         );
     let folder = tempfile::tempdir().unwrap();
-    std::fs::copy(ready("self-calibration/machine.toml"), folder.path().join("machine.toml")).unwrap();
+    let machine = change(std::fs::read_to_string(ready("self-calibration/machine.toml")).unwrap());
+    std::fs::write(folder.path().join("machine.toml"), machine).unwrap();
     let path = folder.path().join("session.toml");
     std::fs::write(&path, edited).unwrap();
     files::session(&path, &ReadOptions::default()).unwrap()
@@ -289,6 +295,23 @@ fn any_number_of_angles_and_any_second_direction() {
         for (parameter, expected) in report.parameters.iter().zip([4.0, -3.0]) {
             assert!((parameter.value - expected).abs() < 0.05, "N = {count}: {parameter:?}");
         }
+    }
+}
+
+/// Between the table and the bed there may be another axis under the table, or none.
+#[test]
+fn a_table_on_the_bed_has_the_same_errors() {
+    let without_b = |machine: String| {
+        let (before, rest) = machine.split_once("[axis.B]").unwrap();
+        let (_, after) = rest.split_once("[axis.X]").unwrap();
+        format!("{}[axis.X]{after}", before.replace("w C B b", "w C b"))
+    };
+    let mut session = plan_on(8, 45.0, without_b);
+    assert_eq!(session.machine.workpiece_side, 1);
+    touched(&mut session, &Touched { axis: [4e-3, -3e-3], cylinder: [0.030, 0.010], ..Touched::default() });
+    let report = calibrate(&session).unwrap().report(&session, None);
+    for (parameter, expected) in report.parameters.iter().zip([4.0, -3.0]) {
+        assert!((parameter.value - expected).abs() < 0.05, "{parameter:?}");
     }
 }
 
