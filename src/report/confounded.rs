@@ -54,8 +54,8 @@ pub fn section(
 
 /// The readings that are excluded as outliers; without `--all`, those with the largest residual.
 fn outliers(outliers: &[Outlier], unit: ReadingUnit) -> Table {
-    let is_are = if outliers.len() == 1 { "is" } else { "are" };
-    let title = format!("{} {is_are} excluded as outliers", counted(outliers.len(), "reading"));
+    let excluded = if outliers.len() == 1 { "is excluded as an outlier" } else { "are excluded as outliers" };
+    let title = format!("{} {excluded}", counted(outliers.len(), "reading"));
     let rows = outliers.iter().map(|o| cells![&o.test, &o.file, o.line.to_string(), of_readings(o.residual_um, unit)]);
     let mut table = Table::new(["test", "file", ">line", ">residual"], rows).titled(title);
     if outliers.len() > MAX_OUTLIERS + 1 {
