@@ -28,6 +28,7 @@ struct Tally {
     near: Rate,
     named_first: Rate,
     more: Rate,
+    lowers: Rate,
     surplus: Rate,
     separable: Rate,
     far: Rate,
@@ -47,6 +48,9 @@ fn tally(outcomes: &[TracedSession]) -> Tally {
         tally.found.count(hit.is_some());
         tally.alone.count(hit.is_some() && effects.len() == 1);
         tally.more.count(effects.len() > 1);
+        let rejected = &outcome.result.rejected_candidates;
+        let lowers = rejected.iter().any(|rejected| rejected.heldout_decrease_um > 0.0);
+        tally.lowers.count(hit.is_none() && effects.is_empty() && lowers);
         if let Some(effect) = hit {
             tally.named_first.count(is(&effect.name, truth));
             let surplus = |sigma, numbers| surplus_aliases(outcome, effect, truth, sigma, numbers);
@@ -93,6 +97,7 @@ fn print(factor: f64, tally: &Tally) {
     println!("| the same and nothing else claimed | {} |", tally.alone);
     println!("| truth named first | {} |", tally.named_first);
     println!("| more than one effect claimed | {} |", tally.more);
+    println!("| none claimed, and one rejected that lowers the held-out error | {} |", tally.lowers);
     println!("| alias sets with a surplus member beyond 2 sigma | {} |", tally.surplus);
     println!("| the same, members with their own numbers | {} |", tally.separable);
     println!("| alias sets with a surplus member beyond {FAR_SIGMA} sigma | {} |", tally.far);
