@@ -160,7 +160,7 @@ fn outliers_of_short_sessions_are_excluded() {
     let excluded = |number: usize| -> Vec<(bool, bool)> {
         let noise = Noise::Outliers { sigma_um: 0.3, share: 0.01 };
         let recipe = Recipe::new(Kind::ALL[number % Kind::ALL.len()], 9000 + number as u64).noise(noise).readings(120);
-        let recipe = Recipe { states_noise: number / Kind::ALL.len() % 2 == 0, ..recipe };
+        let recipe = Recipe { states_noise: (number / Kind::ALL.len()).is_multiple_of(2), ..recipe };
         let (plan, draw) = (recipe.plan(), recipe.draw());
         let folder = tempfile::tempdir().unwrap();
         draw.write(folder.path()).unwrap();
