@@ -129,7 +129,7 @@ fn nothing_is_claimed_without_an_effect() {
         rejected.for_each(|rejected| by_family.entry(family(&rejected.name)).or_default().1 += 1);
     }
     println!(
-        "| condition | an effect claimed | verdict not clean | a candidate rejected | and it lowers the held-out error |\n\
+        "| condition | an effect claimed | verdict not clean | a candidate rejected | none claimed, a rejected one lowers the held-out error |\n\
          |---|---|---|---|---|"
     );
     for (row, Outcome { claimed, not_clean, rejected, lowers }) in
