@@ -85,7 +85,7 @@ const SAME_NOISE: f64 = 0.1;
 fn noise_is_from_residual(search: &Problem, fit: &Problem) -> bool {
     let (of_search, of_fit) = (&search.noise, &fit.noise);
     let of_one_size = (of_search.sigma_mm / of_fit.sigma_mm - 1.0).abs() < SAME_NOISE;
-    of_search.source == NoiseSource::Repeats && !(of_search.ar_coefficients.is_empty() && of_one_size)
+    !of_search.ar_coefficients.is_empty() || (of_search.source == NoiseSource::Repeats && !of_one_size)
 }
 
 /// The structure in the residual of a fit.

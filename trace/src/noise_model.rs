@@ -1,33 +1,40 @@
 //! Estimates the noise model of a trace from repeats: standard deviation and autocorrelation.
 
-use abbe_identify::noise::{NoiseSource, PureError};
+use abbe_identify::noise::{Noise, NoiseSource, PureError};
 use abbe_identify::problem::Problem;
 
 use super::constants::{MIN_AGAINST_STATED, SCATTER};
 use super::policy::Policy;
 
-/// Sets the noise standard deviation and autocorrelation from repeats, if there are enough. A stated standard deviation
-/// needs more of them. Returns whether this changed them by more than their sampling scatter.
+/// Sets the noise standard deviation and autocorrelation from repeats, if there are enough. The standard deviation of
+/// white noise replaces a stated one if more of them determine it, that of autocorrelated noise only if they contradict the
+/// stated one: little of the slow part is left in their deviations. Returns whether this changed the noise by more than its
+/// sampling scatter.
 pub(crate) fn estimate_noise_model(problem: &mut Problem, residuals: &[Vec<f64>]) -> bool {
     if !Policy::of(problem).noise_of_repeats {
         return false;
     }
     let kept = |test: usize, row: usize| !problem.rejected[test][row];
     let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
-    let Some(estimated) = pure.autocorrelation(&problem.tests, kept) else {
+    let stated_mm = problem.session.stated_noise_mm();
+    let Some(estimated) = pure.autocorrelation(stated_mm, &problem.tests, kept) else {
         return false;
     };
-    let white = estimated.coefficients.is_empty();
-    if white && problem.noise.source == NoiseSource::Stated && pure.freedom < MIN_AGAINST_STATED {
-        return false;
-    }
-    let mut noise = problem.noise.clone();
-    noise.ar_coefficients = estimated.coefficients;
-    noise.ar_sum_u = if white { 0.0 } else { estimated.sum_u };
-    if let Some(sigma) = pure.sigma_mm() {
-        noise.sigma_mm = sigma * estimated.inflation;
-        noise.source = NoiseSource::Repeats;
-    }
+    let white = estimated.process.coefficients.is_empty();
+    let (sigma_mm, source) = match (stated_mm, pure.sigma_mm()) {
+        (Some(stated_mm), _) if white && pure.freedom < MIN_AGAINST_STATED => (stated_mm, NoiseSource::Stated),
+        (_, Some(sigma_mm)) if white => (sigma_mm, NoiseSource::Repeats),
+        _ if white => (problem.noise.sigma_mm, problem.noise.source),
+        _ if estimated.is_as_stated => (estimated.process.sigma_mm, NoiseSource::Stated),
+        _ => (estimated.process.sigma_mm, NoiseSource::Repeats),
+    };
+    let noise = Noise {
+        sigma_mm,
+        source,
+        ar_sum_u: if white { 0.0 } else { estimated.sum_u },
+        ar_coefficients: estimated.process.coefficients,
+        inflation: problem.noise.inflation,
+    };
     let present = &problem.noise;
     let same_coefficients = noise.ar_coefficients.len() == present.ar_coefficients.len()
         && noise.ar_coefficients.iter().zip(&present.ar_coefficients).all(|(a, b)| (a - b).abs() < SCATTER);

@@ -16,7 +16,7 @@ use std::ops::Range;
 use std::sync::OnceLock;
 
 use abbe_identify::noise::trends::{TERMS, Trends};
-use abbe_identify::noise::{NoiseSource, PureError};
+use abbe_identify::noise::{NoiseSource, Process, PureError};
 use abbe_identify::numerics::median;
 use abbe_identify::problem::Problem;
 use rand::{RngExt, SeedableRng};
@@ -118,13 +118,14 @@ struct Single {
 }
 
 /// The autocorrelation that an inaccurate whitening leaves.
-struct Spectrum {
-    /// The AR coefficients with which readings are whitened.
-    found: Vec<f64>,
-    /// The first coefficient that the draws have on average.
-    first: f64,
-    /// Its standard uncertainty.
-    u: f64,
+enum Spectrum {
+    /// None.
+    White,
+    /// Of readings that are whitened as white noise: equally probable first coefficients, and the standard deviation of
+    /// what they do not predict over that of the noise.
+    NotSignificant(Vec<(f64, f64)>),
+    /// Of readings that are whitened with these coefficients, whose sum has this standard uncertainty.
+    Significant { coefficients: Vec<f64>, sum_u: f64 },
 }
 
 impl NoiseDraws {
@@ -133,15 +134,14 @@ impl NoiseDraws {
         let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
         let of_repeats = pure.freedom >= MIN_POOL;
         let pool = if of_repeats { pool_of_repeats(problem, &pure) } else { pool_of_residual(problem, residuals) };
-        let found = problem.noise.ar_coefficients.clone();
-        let spectrum = match found.first() {
-            Some(first) => Spectrum { first: *first, u: problem.noise.ar_sum_u, found },
-            // An autocorrelation that is not significant. Deviations in blocks have it; independent draws do not.
-            None => pure.autocorrelation(&problem.tests, kept).map_or_else(Spectrum::white, |estimated| Spectrum {
-                found,
-                first: if of_repeats { 0.0 } else { estimated.of_first_order.max(0.0) },
-                u: estimated.sum_u,
-            }),
+        let coefficients = problem.noise.ar_coefficients.clone();
+        let spectrum = if coefficients.is_empty() {
+            let estimated = pure.autocorrelation(problem.session.stated_noise_mm(), &problem.tests, kept);
+            estimated.map_or(Spectrum::White, |estimated| {
+                Spectrum::not_significant(&estimated.possible, problem.noise.sigma_mm, of_repeats)
+            })
+        } else {
+            Spectrum::Significant { coefficients, sum_u: problem.noise.ar_sum_u }
         };
         let estimated = problem.noise.source == NoiseSource::Repeats;
         let freedom = estimated.then_some(pure.freedom as f64);
@@ -259,31 +259,41 @@ impl Single {
 }
 
 impl Spectrum {
-    fn white() -> Spectrum {
-        Spectrum { found: Vec::new(), first: 0.0, u: 0.0 }
+    /// An autocorrelation that is not significant. Deviations in blocks have it, and lack its uncertainty only;
+    /// independent draws lack all of it.
+    fn not_significant(possible: &[Process], sigma_mm: f64, in_blocks: bool) -> Spectrum {
+        let first = |process: &Process| process.coefficients[0];
+        let mean = possible.iter().map(first).sum::<f64>() / possible.len() as f64;
+        let lacking = |process: &Process| match in_blocks {
+            true => (first(process) - mean, (1.0 - (first(process) - mean).powi(2)).max(0.0).sqrt()),
+            false => (first(process), process.innovation_mm / sigma_mm),
+        };
+        Spectrum::NotSignificant(possible.iter().map(lacking).collect())
     }
 
     /// Gives a draw the spectrum that an inaccurate whitening leaves. Whitening with an inaccurate autocorrelation under-
     /// or over-whitens. The AR coefficients of each draw differ from the estimate by its uncertainty. With `A` the
     /// polynomial of the whitening and `A*` that of the draw, `A* w = A ε`.
     fn give(&self, values: &mut [f64], generator: &mut Pcg64) {
-        if self.first == 0.0 && self.u <= 0.0 {
-            return;
-        }
-        let standard: f64 = generator.sample(StandardNormal);
-        let mut own = self.found.clone();
-        own.resize(own.len().max(1), 0.0);
-        own[0] = self.first;
-        let sum: f64 = own.iter().sum();
-        own[0] += (self.u * standard).clamp(-MAX_AR_SUM - sum, MAX_AR_SUM - sum);
-        // Without whitening the variance of a reading is known, and not that of its innovation.
-        let scale = if self.found.is_empty() { (1.0 - own[0] * own[0]).sqrt() } else { 1.0 };
+        let (own, found, scale) = match self {
+            Spectrum::White => return,
+            Spectrum::NotSignificant(possible) => {
+                let (first, scale) = possible[generator.random_range(0..possible.len())];
+                (vec![first], &[0.0][..], scale)
+            }
+            Spectrum::Significant { coefficients, sum_u } => {
+                let standard: f64 = generator.sample(StandardNormal);
+                let mut own = coefficients.clone();
+                let sum: f64 = own.iter().sum();
+                own[0] += (sum_u * standard).clamp(-MAX_AR_SUM - sum, MAX_AR_SUM - sum);
+                (own, &coefficients[..], 1.0)
+            }
+        };
         let drawn = values.to_vec();
         for t in 0..values.len() {
             let mut value = scale * drawn[t];
-            for (lag, own) in own.iter().enumerate() {
+            for (lag, (own, found)) in own.iter().zip(found).enumerate() {
                 if let Some(before) = t.checked_sub(lag + 1) {
-                    let found = self.found.get(lag).copied().unwrap_or(0.0);
                     value += own * values[before] - found * drawn[before];
                 }
             }

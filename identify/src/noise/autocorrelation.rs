@@ -1,131 +1,391 @@
 //! Autocorrelation of the noise along runs, from the deviations of repeats.
+//!
+//! Removing a trend from every run removes slow noise too: with a coefficient of 0.8 and a hundred readings per run, more
+//! than half of its slow part. The autoregression is therefore estimated from what the trend leaves. For `n` deviations
+//! `d` of a run without the orthonormal terms `Q` of its trend, the restricted likelihood is (Harville, J. Am. Stat. Assoc.
+//! 72 (1977) 320, Eq. 4.2)
+//!
+//! ```text
+//! −2 ln L = m ln σ² + ln |R| + ln |QᵀR⁻¹Q| + dᵀPd/σ²,   m = n − rank Q,
+//! P = R⁻¹ − R⁻¹Q (QᵀR⁻¹Q)⁻¹ QᵀR⁻¹
+//! ```
+//!
+//! with the autocorrelations `R` of the process. They follow from its partial autocorrelations `κ`, each between −1 and 1:
+//! the recursion of Durbin and Levinson gives the prediction of each reading from those before, and thus the `W` of
+//! `R⁻¹ = WᵀW`. In short runs the likelihood is flat towards a random walk, so `κ₁` is the mean of its posterior with a
+//! uniform prior. Its maximum would often lie at the bound.
 
-use std::collections::BTreeMap;
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::ops::Range;
 
 use abbe_model::session::Test;
+use nalgebra::{SMatrix, SVector};
 
 use super::PureError;
-use super::trends::{TERMS, trend_terms};
+use super::trends::{TERMS, Trends, orthonormalise};
+use crate::numerics::golden_section::highest;
+
+/// Maximum autoregressive order.
+const MAX_ORDER: usize = 3;
+/// Least number of pairs of deviations at the largest lag.
+const MIN_PAIRS: usize = 50;
+/// The largest partial autocorrelation.
+const MAX_PARTIAL: f64 = 0.98;
+/// Decrease of −2 ln L that the first coefficient needs, and by which repeats contradict a stated standard deviation: 1 %.
+const SIGNIFICANT: f64 = 6.63;
+/// Decrease of −2 ln L that each further coefficient needs: 0.3 %.
+const SIGNIFICANT_FURTHER: f64 = 9.0;
+/// Places of a first look at the likelihood, and steps of its search between three of them.
+const PLACES: usize = 9;
+const STEPS: usize = 16;
+/// −2 ln L above its minimum at which the posterior ends, and places within it.
+const NEGLIGIBLE: f64 = 20.0;
+const PLACES_OF_POSTERIOR: usize = 40;
+/// Number of equally probable processes that represent the posterior.
+const POSSIBLE: usize = 20;
+
+/// Autocorrelation of the noise along runs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Autocorrelation {
+    /// The estimate. White if no coefficient is significant.
+    pub process: Process,
+    /// Standard uncertainty of the sum of the coefficients; of the first one if none is significant.
+    pub sum_u: f64,
+    /// Whether the standard deviation is the stated one, which the repeats do not contradict.
+    pub is_as_stated: bool,
+    /// Processes of first or higher order that are equally probable.
+    pub possible: Vec<Process>,
+}
+
+/// An autoregressive process.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Process {
+    /// Coefficients; empty for white noise.
+    pub coefficients: Vec<f64>,
+    /// Standard deviation of a value, mm.
+    pub sigma_mm: f64,
+    /// Standard deviation of the part that earlier values do not predict, mm.
+    pub innovation_mm: f64,
+}
 
 impl PureError {
-    /// Autocorrelation along runs: autoregressive coefficients by Yule–Walker. The order is the least one, up to three,
-    /// whose successor is insignificant. `None` without enough repeats.
-    ///
-    /// Removing a trend from every run removes slow noise too: with a coefficient of 0.8 and a hundred readings per
-    /// run, more than half of its slow part. The autocovariances are therefore corrected. The correction ends when
-    /// noise with the estimated coefficients, after the same treatment, has the observed autocovariances (indirect
-    /// inference: Gouriéroux, Monfort & Renault, J. Appl. Econometrics 8 (1993) S85).
-    pub fn autocorrelation(&self, tests: &[Test], kept: impl Fn(usize, usize) -> bool) -> Option<Autocorrelation> {
-        self.autocorrelation_up_to(MAX_ORDER, tests, kept)
-    }
-
-    /// As [`PureError::autocorrelation`], with a maximum order.
-    pub(super) fn autocorrelation_up_to(
+    /// Autocorrelation along runs. The order is the least one, up to three, whose successor is insignificant. `None`
+    /// without enough repeats. With a stated standard deviation, mm, that the repeats do not contradict, the coefficients
+    /// are those of noise of this standard deviation.
+    pub fn autocorrelation(
         &self,
-        order: usize,
+        stated_mm: Option<f64>,
         tests: &[Test],
         kept: impl Fn(usize, usize) -> bool,
     ) -> Option<Autocorrelation> {
-        // Deviations before their rescaling for the trends: the variance that trends remove depends on the
-        // autocorrelation.
-        let mut covariance = [0.0; MAX_ORDER + 1];
-        let mut enlarged = 0.0;
-        let mut pairs = [0_usize; MAX_ORDER + 1];
-        let mut lengths: BTreeMap<usize, usize> = BTreeMap::new();
+        Some(DetrendedRuns::of(self, tests, kept)?.autocorrelation(MAX_ORDER, stated_mm))
+    }
+
+    /// The coefficients of at most first order.
+    pub(super) fn coefficients_of_first_order(
+        &self,
+        tests: &[Test],
+        kept: impl Fn(usize, usize) -> bool,
+    ) -> Option<Vec<f64>> {
+        Some(DetrendedRuns::of(self, tests, kept)?.autocorrelation(1, None).process.coefficients)
+    }
+}
+
+/// The deviations of repeats along runs.
+struct DetrendedRuns {
+    alike: Vec<AlikeRuns>,
+}
+
+/// Runs of one test with deviations at the same places.
+struct AlikeRuns {
+    /// The places of uninterrupted deviations.
+    stretches: Vec<Range<usize>>,
+    /// The orthonormal terms of the trend at each place; zero for missing terms.
+    trend: Vec<[f64; TERMS]>,
+    /// The deviations of each run, mm. Those of white noise have its variance, less that of the trend.
+    runs: Vec<Vec<f64>>,
+    /// Share of independent deviations: two repeats hold the same deviation twice.
+    independent: f64,
+}
+
+impl DetrendedRuns {
+    /// `None` without enough pairs of deviations, and for readings of several channels.
+    fn of(pure: &PureError, tests: &[Test], kept: impl Fn(usize, usize) -> bool) -> Option<DetrendedRuns> {
+        let (mut alike, mut pairs) = (Vec::new(), 0);
         for (number, test) in tests.iter().enumerate() {
             let readings = test.readings.as_ref()?;
             if readings.channels != 1 {
                 return None;
             }
+            let trends = Trends::of(readings, |row| kept(number, row));
+            let deviation = |row: usize| pure.deviations[number][row].filter(|_| kept(number, row)).unwrap_or(f64::NAN);
+            let mut whole_runs: HashMap<usize, usize> = HashMap::new();
+            let first_of_test = alike.len();
             for run in readings.runs() {
-                for lag in 0..=MAX_ORDER {
-                    for row in run.start + lag..run.end {
-                        let both = self.deviations[number][row].zip(self.deviations[number][row - lag]);
-                        if let Some((now, before)) = both
-                            && kept(number, row)
-                            && kept(number, row - lag)
-                        {
-                            covariance[lag] += now * before / self.rescaling_of_tests[number].powi(2);
-                            pairs[lag] += 1;
-                            if lag == 0 {
-                                enlarged += now * before;
-                            }
+                let known: Vec<usize> = run.clone().filter(|row| !deviation(*row).is_nan()).collect();
+                let values = known.iter().map(|row| deviation(*row) / pure.rescaling(number)).collect();
+                let stretches = stretches(&known);
+                pairs += stretches.iter().map(|stretch| stretch.len().saturating_sub(MAX_ORDER)).sum::<usize>();
+                let place = match whole_runs.entry(run.len()) {
+                    Entry::Occupied(entry) if known.len() == run.len() => *entry.get(),
+                    entry => {
+                        let mut trend: Vec<[f64; TERMS]> = known.iter().map(|row| trends.terms_at(*row)).collect();
+                        orthonormalise(&mut trend);
+                        alike.push(AlikeRuns { stretches, trend, runs: Vec::new(), independent: 1.0 });
+                        if known.len() == run.len() {
+                            entry.insert_entry(alike.len() - 1);
                         }
+                        alike.len() - 1
                     }
+                };
+                alike[place].runs.push(values);
+            }
+            let of_test = &mut alike[first_of_test..];
+            let freedom: f64 = of_test.iter().map(|alike| alike.freedom_of_run() * alike.runs.len() as f64).sum();
+            let independent = (pure.freedom_of_tests[number] / freedom.max(f64::MIN_POSITIVE)).min(1.0);
+            of_test.iter_mut().for_each(|alike| alike.independent = independent);
+        }
+        alike.retain(|alike| alike.freedom_of_run() > 0.5 && alike.independent > 0.0);
+        let is_constant = alike.iter().flat_map(|alike| alike.runs.iter().flatten()).all(|value| *value == 0.0);
+        (pairs >= MIN_PAIRS && !is_constant).then_some(DetrendedRuns { alike })
+    }
+
+    fn autocorrelation(&self, most: usize, stated_mm: Option<f64>) -> Autocorrelation {
+        let stated_mm = stated_mm.filter(|sigma_mm| {
+            let [with_stated, free] = [Some(*sigma_mm), None].map(|stated_mm| self.best(&[0.0], 0, stated_mm).0);
+            // White noise of another standard deviation has as many parameters.
+            with_stated - free < SIGNIFICANT && with_stated < self.fit(&[], None).minus_two_ln
+        });
+        let mut partials: Vec<f64> = Vec::new();
+        let mut least = self.fit(&partials, stated_mm).minus_two_ln;
+        let mut first = 0.0;
+        for needed in [SIGNIFICANT, SIGNIFICANT_FURTHER, SIGNIFICANT_FURTHER].into_iter().take(most) {
+            let mut further = [&partials[..], &[0.0]].concat();
+            let order = further.len();
+            // The partial autocorrelations hardly depend on each other.
+            let mut value = least;
+            for k in (0..order).rev() {
+                (value, further[k]) = self.best(&further, k, stated_mm);
+            }
+            if order == 1 {
+                first = further[0];
+            }
+            if least - value < needed {
+                break;
+            }
+            (partials, least) = (further, value);
+        }
+        let is_white = partials.is_empty();
+        let around = if is_white { vec![first] } else { partials.clone() };
+        let posterior = self.posterior(around, stated_mm);
+        if let Some(first) = partials.first_mut() {
+            *first = posterior.mean;
+        }
+        Autocorrelation {
+            process: self.process(&partials, stated_mm),
+            sum_u: posterior.sum_u,
+            is_as_stated: stated_mm.is_some(),
+            possible: posterior.possible,
+        }
+    }
+
+    /// The partial autocorrelation of order `k + 1` with the greatest likelihood beside the others, and −2 ln L.
+    fn best(&self, partials: &[f64], k: usize, stated_mm: Option<f64>) -> (f64, f64) {
+        let at = |partial: f64| {
+            let mut partials = partials.to_vec();
+            partials[k] = partial;
+            self.fit(&partials, stated_mm).minus_two_ln
+        };
+        let spacing = 2.0 * MAX_PARTIAL / (PLACES - 1) as f64;
+        let place = |i: usize| -MAX_PARTIAL + i as f64 * spacing;
+        let values: Vec<f64> = (0..PLACES).map(|i| at(place(i))).collect();
+        let lowest = (0..PLACES).min_by(|a, b| values[*a].total_cmp(&values[*b])).unwrap_or(0);
+        let (low, high) = (place(lowest.saturating_sub(1)), place((lowest + 1).min(PLACES - 1)));
+        let (negative, partial) = highest(
+            |share| {
+                let partial = low + share * (high - low);
+                (-at(partial), partial)
+            },
+            STEPS,
+        );
+        (-negative, partial)
+    }
+
+    /// The posterior of the first partial autocorrelation about its mode, beside the others.
+    fn posterior(&self, mode: Vec<f64>, stated_mm: Option<f64>) -> Posterior {
+        let with_first = |first: f64| [&[first], &mode[1..]].concat();
+        let value = |first: f64| self.fit(&with_first(first), stated_mm).minus_two_ln;
+        let least = value(mode[0]);
+        // The end of what is not negligible on one side, by bisection.
+        let end = |bound: f64| {
+            let (mut inside, mut outside) = (mode[0], bound);
+            for _ in 0..STEPS {
+                if value(outside) - least < NEGLIGIBLE {
+                    break;
                 }
-                *lengths.entry(run.len()).or_default() += run.len();
+                let middle = 0.5 * (inside + outside);
+                if value(middle) - least < NEGLIGIBLE { inside = middle } else { outside = middle }
+            }
+            outside
+        };
+        let (low, high) = (end(-MAX_PARTIAL), end(MAX_PARTIAL));
+        let step = (high - low) / PLACES_OF_POSTERIOR as f64;
+        let places: Vec<f64> = (0..PLACES_OF_POSTERIOR).map(|i| low + (i as f64 + 0.5) * step).collect();
+        let mut weights: Vec<f64> = places.iter().map(|first| (-0.5 * (value(*first) - least)).exp()).collect();
+        let total: f64 = weights.iter().sum();
+        weights.iter_mut().for_each(|weight| *weight /= total);
+        let mean_of = |of: &dyn Fn(f64) -> f64| -> f64 { places.iter().zip(&weights).map(|(p, w)| w * of(*p)).sum() };
+        let sum = |first: f64| Predictions::of(&with_first(first)).coefficients().iter().sum::<f64>();
+        let mean_sum = mean_of(&sum);
+        let mut cumulative = 0.0;
+        let mut possible = Vec::with_capacity(POSSIBLE);
+        for (first, weight) in places.iter().zip(&weights) {
+            cumulative += weight;
+            while (possible.len() as f64 + 0.5) < cumulative * POSSIBLE as f64 {
+                possible.push(self.process(&with_first(*first), stated_mm));
             }
         }
-        if pairs[MAX_ORDER] < MIN_PAIRS || covariance[0] <= 0.0 {
-            return None;
+        Posterior {
+            mean: mean_of(&|first| first),
+            sum_u: mean_of(&|first| (sum(first) - mean_sum).powi(2)).sqrt(),
+            possible,
         }
-        let observed: [f64; MAX_ORDER + 1] = std::array::from_fn(|lag| covariance[lag] / pairs[lag] as f64);
-        // Two repeats hold the same deviation twice, so half of the pairs are independent.
-        let insignificant = 3.0 / (0.5 * pairs[0] as f64).sqrt();
-        let (coefficients, variance) = correct_for_detrending(&observed, order, insignificant, &lengths);
-        // Bartlett's standard error of the lag-1 correlation, propagated through the correction.
-        let neighbours = observed[1] / observed[0];
-        let ratio = if coefficients.is_empty() { 1.0 } else { SCATTER_RATIO };
-        let u = ratio * ((1.0 - neighbours * neighbours).max(0.0) / self.freedom.max(1) as f64).sqrt();
-        let mut shifted = observed;
-        shifted[1..].iter_mut().for_each(|value| *value += u * observed[0]);
-        // A coefficient that is not significant has an estimate too.
-        let (order, insignificant) = if coefficients.is_empty() { (1, 0.0) } else { (order, insignificant) };
-        let total = |observed| correct_for_detrending(observed, order, insignificant, &lengths).0.iter().sum::<f64>();
-        let sum = total(&observed);
-        Some(Autocorrelation {
-            sum_u: (total(&shifted) - sum).abs(),
-            of_first_order: if coefficients.is_empty() { sum } else { 0.0 },
-            coefficients,
-            inflation: (variance * pairs[0] as f64 / enlarged).sqrt(),
-        })
+    }
+
+    /// The process with these partial autocorrelations.
+    fn process(&self, partials: &[f64], stated_mm: Option<f64>) -> Process {
+        let predictions = Predictions::of(partials);
+        let sigma_mm = self.fit(partials, stated_mm).sigma_mm;
+        let innovation_mm = sigma_mm * predictions.variances[partials.len()].sqrt();
+        Process { coefficients: predictions.coefficients().to_vec(), sigma_mm, innovation_mm }
+    }
+
+    /// The restricted likelihood of partial autocorrelations, with the stated or else the best standard deviation.
+    fn fit(&self, partials: &[f64], stated_mm: Option<f64>) -> RestrictedFit {
+        let predictions = Predictions::of(partials);
+        let (mut freedom, mut ln_determinants, mut squares) = (0.0, 0.0, 0.0);
+        for alike in &self.alike {
+            let of_runs = alike.fit(&predictions);
+            let count = alike.independent * alike.runs.len() as f64;
+            freedom += count * alike.freedom_of_run();
+            ln_determinants += count * of_runs.ln_determinant;
+            squares += alike.independent * of_runs.squares;
+        }
+        let variance = stated_mm.map_or(squares / freedom, |sigma_mm| sigma_mm * sigma_mm);
+        let minus_two_ln = freedom * variance.ln() + ln_determinants + squares / variance;
+        RestrictedFit { minus_two_ln, sigma_mm: variance.sqrt() }
     }
 }
 
-/// Coefficients and variance of the noise whose detrended deviations have these autocovariances.
-fn correct_for_detrending(
-    observed: &[f64; MAX_ORDER + 1],
-    order: usize,
-    insignificant: f64,
-    lengths: &BTreeMap<usize, usize>,
-) -> (Vec<f64>, f64) {
-    let mut coefficients = autoregression(observed, order, insignificant);
-    let mut variance = observed[0];
-    for _ in 0..CORRECTIONS {
-        let (process, shown) = detrended(&coefficients, lengths);
-        variance = observed[0] / shown[0];
-        let corrected = std::array::from_fn(|lag| observed[lag] + variance * (process[lag] - shown[lag]));
-        let next = autoregression(&corrected, order, insignificant);
-        if next == coefficients {
-            break;
-        }
-        coefficients = next;
-    }
-    (coefficients, variance)
+/// The posterior of the first partial autocorrelation.
+struct Posterior {
+    mean: f64,
+    /// Standard deviation of the sum of the coefficients.
+    sum_u: f64,
+    possible: Vec<Process>,
 }
 
-/// Least number of pairs of deviations at the largest lag.
-const MIN_PAIRS: usize = 50;
-/// Maximum autoregressive order.
-const MAX_ORDER: usize = 3;
-const CORRECTIONS: usize = 8;
-/// Ratio of the actual scatter of the lag-1 correlation to Bartlett's formula. The excess is due to removed trends and
-/// selected orders. Over 64 simulated sessions with a coefficient of 0.8 the scatter was 0.034.
-const SCATTER_RATIO: f64 = 1.6;
-/// Run length beyond which detrending removes a negligible part of the noise.
-const LONG_RUN: usize = 600;
+struct RestrictedFit {
+    minus_two_ln: f64,
+    sigma_mm: f64,
+}
 
-/// Autocorrelation of the noise along runs.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Autocorrelation {
-    /// Autoregressive coefficients; empty for white noise.
-    pub coefficients: Vec<f64>,
-    /// Standard uncertainty of their sum, or of the coefficient of first order that is not significant.
-    pub sum_u: f64,
-    /// The coefficient of first order that is not significant; 0 if there are significant coefficients.
-    pub of_first_order: f64,
-    /// Ratio of the noise standard deviation to that of the deviations, which are rescaled as white noise.
-    pub inflation: f64,
+/// `ln |R| + ln |QᵀR⁻¹Q|` of one run, and `dᵀPd` summed over runs, mm².
+struct FitOfRuns {
+    ln_determinant: f64,
+    squares: f64,
+}
+
+impl AlikeRuns {
+    /// Degrees of freedom of one run beside its trend.
+    fn freedom_of_run(&self) -> f64 {
+        self.trend.len() as f64 - self.trend.iter().flatten().map(|q| q * q).sum::<f64>()
+    }
+
+    /// Whether the trend lacks a term.
+    fn is_missing(&self, term: usize) -> bool {
+        self.trend.iter().all(|q| q[term] == 0.0)
+    }
+
+    fn fit(&self, predictions: &Predictions) -> FitOfRuns {
+        let orders = || self.stretches.iter().flat_map(|stretch| 0..stretch.len());
+        let mut ln_determinant: f64 = orders().map(|past| predictions.variance(past).ln()).sum();
+        let trend: Vec<SVector<f64, TERMS>> = predictions.whitened(&self.stretches, |i| SVector::from(self.trend[i]));
+        let mut products: SMatrix<f64, TERMS, TERMS> = trend.iter().map(|q| q * q.transpose()).sum();
+        // A missing term has no part in the determinant.
+        for i in (0..TERMS).filter(|i| self.is_missing(*i)) {
+            products[(i, i)] = 1.0;
+        }
+        let factor = products.cholesky();
+        ln_determinant += factor.as_ref().map_or(0.0, |factor| factor.ln_determinant());
+        let squares_of = |run: &Vec<f64>| {
+            let white: Vec<SVector<f64, 1>> = predictions.whitened(&self.stretches, |i| SVector::from([run[i]]));
+            let along: SVector<f64, TERMS> = white.iter().zip(&trend).map(|(value, q)| q * value[0]).sum();
+            let of_trend = factor.as_ref().map_or(0.0, |factor| along.dot(&factor.solve(&along)));
+            white.iter().map(|value| value[0] * value[0]).sum::<f64>() - of_trend
+        };
+        FitOfRuns { ln_determinant, squares: self.runs.iter().map(squares_of).sum() }
+    }
+}
+
+/// The predictions of a value of a process of unit variance from values before it.
+struct Predictions {
+    /// For each number of values before it, up to the order: their coefficients, the last value first.
+    coefficients: Vec<Vec<f64>>,
+    /// For each number of values before it: the variance that these leave.
+    variances: Vec<f64>,
+}
+
+impl Predictions {
+    /// From partial autocorrelations, by the recursion of Durbin and Levinson.
+    fn of(partials: &[f64]) -> Predictions {
+        let mut predictions = Predictions { coefficients: vec![Vec::new()], variances: vec![1.0] };
+        for (order, partial) in partials.iter().enumerate() {
+            let last = &predictions.coefficients[order];
+            let mut next: Vec<f64> = (0..order).map(|k| last[k] - partial * last[order - 1 - k]).collect();
+            next.push(*partial);
+            predictions.variances.push(predictions.variances[order] * (1.0 - partial * partial));
+            predictions.coefficients.push(next);
+        }
+        predictions
+    }
+
+    /// The coefficients of the process.
+    fn coefficients(&self) -> &[f64] {
+        &self.coefficients[self.coefficients.len() - 1]
+    }
+
+    fn variance(&self, past: usize) -> f64 {
+        self.variances[past.min(self.variances.len() - 1)]
+    }
+
+    /// `W v` for values in stretches: what their past does not predict, of unit variance.
+    fn whitened<const N: usize>(
+        &self,
+        stretches: &[Range<usize>],
+        value: impl Fn(usize) -> SVector<f64, N>,
+    ) -> Vec<SVector<f64, N>> {
+        let values = stretches.iter().flat_map(|stretch| stretch.clone().map(move |i| (i, i - stretch.start)));
+        let whitened = |(i, past): (usize, usize)| {
+            let coefficients = &self.coefficients[past.min(self.coefficients.len() - 1)];
+            let predicted: SVector<f64, N> =
+                coefficients.iter().enumerate().map(|(lag, a)| value(i - lag - 1) * *a).sum();
+            (value(i) - predicted) / self.variance(past).sqrt()
+        };
+        values.map(whitened).collect()
+    }
+}
+
+/// The places of uninterrupted rows.
+fn stretches(rows: &[usize]) -> Vec<Range<usize>> {
+    let mut stretches = Vec::new();
+    let mut start = 0;
+    for uninterrupted in rows.chunk_by(|a, b| a + 1 == *b) {
+        stretches.push(start..start + uninterrupted.len());
+        start += uninterrupted.len();
+    }
+    stretches
 }
 
 /// Factor on the variance of a mean if neighbouring values are correlated: `(1 + r)/(1 − r)`. `r` is the sum of the
@@ -135,97 +395,14 @@ pub(crate) fn enlargement_of_mean(products: f64, squares: f64, most: f64) -> f64
     (1.0 + correlation) / (1.0 - correlation)
 }
 
-/// Coefficients from autocovariances (Durbin–Levinson). The last coefficient of each order is its partial
-/// autocorrelation.
-fn autoregression(covariance: &[f64; MAX_ORDER + 1], most: usize, insignificant: f64) -> Vec<f64> {
-    let correlation = covariance.map(|value| value / covariance[0]);
-    let mut coefficients: Vec<f64> = Vec::new();
-    let mut accepted = Vec::new();
-    let mut unexplained = 1.0;
-    for order in 1..=most {
-        let predicted: f64 = coefficients.iter().enumerate().map(|(k, a)| a * correlation[order - 1 - k]).sum();
-        let partial = ((correlation[order] - predicted) / unexplained).clamp(-0.99, 0.99);
-        let previous = coefficients.clone();
-        for k in 0..previous.len() {
-            coefficients[k] = previous[k] - partial * previous[previous.len() - 1 - k];
-        }
-        coefficients.push(partial);
-        unexplained *= 1.0 - partial * partial;
-        if partial.abs() > insignificant {
-            accepted = coefficients.clone();
-        }
-    }
-    accepted
-}
-
-/// Autocorrelations of a process, and their expectation after detrending of runs with these lengths. `lengths` gives
-/// the number of readings in runs of each length.
-fn detrended(coefficients: &[f64], lengths: &BTreeMap<usize, usize>) -> ([f64; MAX_ORDER + 1], [f64; MAX_ORDER + 1]) {
-    let longest = lengths.keys().copied().filter(|n| *n <= LONG_RUN).max().unwrap_or(0).max(MAX_ORDER + 1);
-    // Impulse response, long enough for every autocorrelation short of a drift.
-    let mut response = vec![0.0; longest + 2000];
-    response[0] = 1.0;
-    for t in 1..response.len() {
-        response[t] =
-            coefficients.iter().enumerate().filter(|(k, _)| *k < t).map(|(k, a)| a * response[t - 1 - k]).sum();
-    }
-    let power: f64 = response.iter().map(|r| r * r).sum();
-    // Beyond the order of the process its autocorrelations follow from those before (Yule–Walker).
-    let mut correlation: Vec<f64> = (0..=MAX_ORDER)
-        .map(|lag| response[lag..].iter().zip(&response).map(|(a, b)| a * b).sum::<f64>() / power)
-        .collect();
-    for lag in correlation.len()..longest {
-        let terms = coefficients.iter().enumerate();
-        correlation.push(terms.map(|(k, a)| a * correlation[lag - 1 - k]).sum());
-    }
-    let process = std::array::from_fn(|lag| correlation[lag]);
-    let mut shown = [0.0; MAX_ORDER + 1];
-    let mut total = 0.0;
-    for (&n, &readings) in lengths {
-        let weight = readings as f64;
-        total += weight;
-        if !(MAX_ORDER + 1..=LONG_RUN).contains(&n) {
-            (0..=MAX_ORDER).for_each(|lag| shown[lag] += weight * process[lag]);
-            continue;
-        }
-        // d = e − Q Qᵀe with orthonormal terms Q, so Cov d = Γ − Q(QᵀΓ) − (ΓQ)Qᵀ + Q(QᵀΓQ)Qᵀ.
-        let times: Vec<f64> = (0..n).map(|t| t as f64).collect();
-        let q = trend_terms(&times);
-        let gq: Vec<[f64; TERMS]> = (0..n)
-            .map(|t| {
-                let mut along = [0.0; TERMS];
-                for (s, q) in q.iter().enumerate() {
-                    let correlation = correlation[t.abs_diff(s)];
-                    along.iter_mut().zip(q).for_each(|(along, q)| *along += correlation * q);
-                }
-                along
-            })
-            .collect();
-        let qgq: [[f64; TERMS]; TERMS] =
-            std::array::from_fn(|i| std::array::from_fn(|j| (0..n).map(|t| q[t][i] * gq[t][j]).sum()));
-        for lag in 0..=MAX_ORDER {
-            let sum: f64 = (lag..n)
-                .map(|t| {
-                    let s = t - lag;
-                    let mut value = correlation[lag];
-                    for i in 0..TERMS {
-                        value -= q[t][i] * gq[s][i] + gq[t][i] * q[s][i];
-                        for j in 0..TERMS {
-                            value += q[t][i] * qgq[i][j] * q[s][j];
-                        }
-                    }
-                    value
-                })
-                .sum();
-            shown[lag] += weight * sum / (n - lag) as f64;
-        }
-    }
-    (process, shown.map(|value| value / total))
-}
-
 #[cfg(test)]
 mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
+    use rand_pcg::Pcg64;
+
     use super::*;
+    use crate::noise::trends::trend_terms;
 
     /// Autocorrelations by their recursion: `ρ₁ = a₁/(1 − a₂)`, then `ρ_k = a₁ ρ_{k−1} + a₂ ρ_{k−2}`.
     fn correlations(a: [f64; 2], count: usize) -> Vec<f64> {
@@ -236,60 +413,147 @@ mod tests {
         correlation
     }
 
+    fn trend(readings: usize) -> Vec<[f64; TERMS]> {
+        trend_terms(&(0..readings).map(|t| t as f64).collect::<Vec<_>>())
+    }
+
+    /// The partial autocorrelations of an autoregression of order two are `ρ₁` and `a₂`.
     #[test]
-    fn autoregression_returns_the_coefficients_and_the_order() {
+    fn predictions_have_the_coefficients_of_the_process() {
         for a in [[0.8, 0.0], [1.1, -0.4], [-0.5, 0.3]] {
-            let correlation = correlations(a, MAX_ORDER + 1);
-            let covariance = std::array::from_fn(|lag| 2.5 * correlation[lag]);
-            let found = autoregression(&covariance, MAX_ORDER, 1e-6);
-            let wanted = if a[1] == 0.0 { &a[..1] } else { &a[..] };
-            assert_eq!(found.len(), wanted.len());
-            assert!(found.iter().zip(wanted).all(|(f, w)| (f - w).abs() < 1e-12), "{found:?}");
-            assert_eq!(autoregression(&covariance, 1, 1e-6).len(), 1);
-            assert!(autoregression(&covariance, MAX_ORDER, 1.0).is_empty());
+            let correlation = correlations(a, 3);
+            let predictions = Predictions::of(&[correlation[1], a[1]]);
+            assert!(predictions.coefficients().iter().zip(a).all(|(found, a)| (found - a).abs() < 1e-12));
+            // The variance that a prediction leaves: 1 − Σ aₖ ρₖ.
+            let left = 1.0 - a[0] * correlation[1] - a[1] * correlation[2];
+            assert!(
+                (predictions.variance(2) - left).abs() < 1e-12 && predictions.variance(7) == predictions.variances[2]
+            );
         }
     }
 
-    /// Compares with `Cov d = P Γ P`, `P = 1 − Q Qᵀ`, as explicit products. A run of negligible trend shows the
-    /// autocorrelations of the process itself.
+    /// Compares with the likelihood of contrasts: for orthonormal `N` with `NᵀQ = 0`, those of a run are `Nᵀd` and their
+    /// covariance is `σ² NᵀRN`, as explicit matrices.
     #[test]
-    fn detrended_autocovariances_equal_the_projected_covariance() {
+    fn the_restricted_likelihood_is_that_of_contrasts() {
         let a = [1.1, -0.4];
         let correlation = correlations(a, 60);
-        let mut wanted = [0.0; MAX_ORDER + 1];
-        let lengths = BTreeMap::from([(30, 90), (47, 47), (LONG_RUN + 1, 601)]);
-        for (n, readings) in [(30_usize, 90.0), (47, 47.0)] {
-            let q = trend_terms(&(0..n).map(|t| t as f64).collect::<Vec<_>>());
-            let q = faer::Mat::from_fn(n, TERMS, |t, i| q[t][i]);
-            let p = faer::Mat::<f64>::identity(n, n) - &q * q.transpose();
-            let gamma = faer::Mat::from_fn(n, n, |t, s| correlation[t.abs_diff(s)]);
-            let projected = &p * gamma * &p;
-            for (lag, wanted) in wanted.iter_mut().enumerate() {
-                let mean = (lag..n).map(|t| projected[(t, t - lag)]).sum::<f64>() / (n - lag) as f64;
-                *wanted += readings * mean;
+        let mut generator = Pcg64::seed_from_u64(1);
+        // A run without one reading in its middle, and whole ones.
+        let place = |t: usize, is_whole: bool| if is_whole || t < 11 { t } else { t + 1 };
+        let mut alike = Vec::new();
+        let (mut minus_two_ln, mut freedom) = (0.0, 0.0);
+        for (n, runs, is_whole) in [(30_usize, 2, true), (12, 3, true), (26, 1, false)] {
+            let q = trend(n);
+            let runs: Vec<Vec<f64>> =
+                (0..runs).map(|_| (0..n).map(|_| generator.sample(StandardNormal)).collect()).collect();
+            let r = faer::Mat::from_fn(n, n, |t, s| {
+                let together = is_whole || (t < 11) == (s < 11);
+                if together { correlation[place(t, is_whole).abs_diff(place(s, is_whole))] } else { 0.0 }
+            });
+            // The eigenvectors of 1 − QQᵀ of eigenvalue 1 are contrasts.
+            let terms = faer::Mat::from_fn(n, TERMS, |t, i| q[t][i]);
+            let projector = faer::Mat::<f64>::identity(n, n) - &terms * terms.transpose();
+            let eigen = projector.self_adjoint_eigen(faer::Side::Lower).unwrap();
+            let first = (0..n).find(|i| eigen.S()[*i] > 0.5).unwrap();
+            let contrasts = eigen.U().subcols(first, n - first);
+            let covariance = contrasts.transpose() * r * contrasts;
+            let ln_determinant: f64 =
+                covariance.self_adjoint_eigenvalues(faer::Side::Lower).unwrap().iter().map(|value| value.ln()).sum();
+            let inverse = {
+                use faer::linalg::solvers::DenseSolveCore;
+                covariance.partial_piv_lu().inverse()
+            };
+            for run in &runs {
+                let d = contrasts.transpose() * faer::Mat::from_fn(n, 1, |t, _| run[t]);
+                minus_two_ln += ln_determinant + (d.transpose() * &inverse * &d)[(0, 0)] / 0.49;
+                freedom += (n - first) as f64;
             }
+            let stretches = if is_whole { vec![0..n] } else { vec![0..11, 11..n] };
+            alike.push(AlikeRuns { stretches, trend: q, runs, independent: 1.0 });
         }
-        let (process, shown) = detrended(&a, &lengths);
-        for lag in 0..=MAX_ORDER {
-            assert!((process[lag] - correlation[lag]).abs() < 1e-12);
-            let wanted = (wanted[lag] + 601.0 * correlation[lag]) / 738.0;
-            assert!((shown[lag] - wanted).abs() < 1e-12, "{lag}: {} {wanted}", shown[lag]);
+        minus_two_ln += freedom * 0.49_f64.ln();
+        let fitted = DetrendedRuns { alike }.fit(&[correlation[1], a[1]], Some(0.7));
+        assert!((fitted.minus_two_ln - minus_two_ln).abs() < 1e-9, "{} {minus_two_ln}", fitted.minus_two_ln);
+        assert_eq!(fitted.sigma_mm, 0.7);
+    }
+
+    /// Runs of noise without their trend. Each is independent.
+    fn noise(a: [f64; 2], sigma: f64, lengths: &[usize], generator: &mut Pcg64) -> DetrendedRuns {
+        let predictions = Predictions::of(&[correlations(a, 2)[1], a[1]]);
+        let run = |n: usize, generator: &mut Pcg64| -> Vec<f64> {
+            let mut values: Vec<f64> = Vec::new();
+            for t in 0..n {
+                let coefficients = &predictions.coefficients[t.min(2)];
+                let predicted: f64 = coefficients.iter().enumerate().map(|(lag, a)| a * values[t - lag - 1]).sum();
+                let new: f64 = generator.sample(StandardNormal);
+                values.push(predicted + predictions.variance(t).sqrt() * new);
+            }
+            values.iter().map(|value| sigma * value).collect()
+        };
+        let alike = lengths.iter().map(|n| AlikeRuns {
+            stretches: vec![0..*n],
+            trend: trend(*n),
+            runs: vec![run(*n, generator)],
+            independent: 1.0,
+        });
+        DetrendedRuns { alike: alike.collect() }
+    }
+
+    /// The coefficients, their uncertainty and the standard deviation, over many draws.
+    #[test]
+    fn coefficients_and_variance_are_recovered_from_detrended_runs() {
+        const DRAWS: usize = 60;
+        let mut generator = Pcg64::seed_from_u64(2);
+        for a in [[0.8, 0.0], [0.5, 0.0], [1.1, -0.4]] {
+            let drawn: Vec<Autocorrelation> =
+                (0..DRAWS).map(|_| noise(a, 1.5, &[100; 8], &mut generator).autocorrelation(MAX_ORDER, None)).collect();
+            let order = if a[1] == 0.0 { 1 } else { 2 };
+            let right = drawn.iter().filter(|drawn| drawn.process.coefficients.len() == order).count();
+            assert!(right >= DRAWS - 3, "{a:?}: {right}");
+            let mean = |of: &dyn Fn(&Autocorrelation) -> f64| drawn.iter().map(of).sum::<f64>() / DRAWS as f64;
+            let pull =
+                |drawn: &Autocorrelation| (drawn.process.coefficients.iter().sum::<f64>() - a[0] - a[1]) / drawn.sum_u;
+            let scatter = (mean(&|drawn| pull(drawn).powi(2)) - mean(&pull).powi(2)).sqrt();
+            // Four standard errors of the mean, and of the scatter.
+            assert!(mean(&pull).abs() < 4.0 / (DRAWS as f64).sqrt(), "{a:?}: {}", mean(&pull));
+            assert!((scatter - 1.0).abs() < 4.0 / (2.0 * DRAWS as f64).sqrt(), "{a:?}: {scatter}");
+            let sigma = mean(&|drawn| drawn.process.sigma_mm);
+            assert!((sigma / 1.5 - 1.0).abs() < 0.05, "{a:?}: {sigma}");
+            assert!(drawn.iter().all(|drawn| drawn.possible.len() == POSSIBLE));
         }
     }
 
-    /// The inverse problem: coefficients and standard deviation follow from the autocovariances of detrended runs.
+    /// Of white noise 1 % has a significant coefficient, in short runs too. In short runs of autocorrelated noise a stated
+    /// standard deviation shows the coefficient, as long as the repeats do not contradict it.
     #[test]
-    fn coefficients_and_variance_are_recovered_from_detrended_runs() {
-        for (a, sigma) in [(vec![0.8], 1.5), (vec![0.6, 0.25], 0.7)] {
-            let lengths = BTreeMap::from([(100, 100)]);
-            let (_, shown) = detrended(&a, &lengths);
-            let observed = shown.map(|value| value * sigma * sigma);
-            let (found, variance) = correct_for_detrending(&observed, MAX_ORDER, 0.05, &lengths);
-            assert_eq!(found.len(), a.len(), "{found:?}");
-            for (found, wanted) in found.iter().zip(&a) {
-                assert!((found - wanted).abs() < 0.02, "{found} instead of {wanted}");
-            }
-            assert!((variance / (sigma * sigma) - 1.0).abs() < 0.05, "{variance}");
-        }
+    fn short_runs_show_the_autocorrelation_of_a_stated_standard_deviation() {
+        const DRAWS: usize = 200;
+        let mut generator = Pcg64::seed_from_u64(3);
+        let mut drawn = |first: f64, stated: Option<f64>| -> Vec<Autocorrelation> {
+            let runs = |generator: &mut Pcg64| noise([first, 0.0], 0.3, &[6, 10, 12, 15, 17], generator);
+            (0..DRAWS).map(|_| runs(&mut generator).autocorrelation(MAX_ORDER, stated)).collect()
+        };
+        let significant = |of: &[Autocorrelation]| of.iter().filter(|of| !of.process.coefficients.is_empty()).count();
+        let white = drawn(0.0, None);
+        assert!(significant(&white) <= 8, "{}", significant(&white));
+        let stated = drawn(0.8, Some(0.3));
+        let kept = stated.iter().filter(|of| of.is_as_stated).count();
+        assert!(kept >= 180, "{kept}");
+        let firsts: Vec<f64> =
+            stated.iter().filter(|of| of.is_as_stated).map(|of| of.process.coefficients[0]).collect();
+        let mean = firsts.iter().sum::<f64>() / firsts.len() as f64;
+        let scatter = (firsts.iter().map(|first| (first - mean).powi(2)).sum::<f64>() / firsts.len() as f64).sqrt();
+        assert!((mean - 0.8).abs() < 0.03 && scatter < 0.1, "{mean} {scatter}");
+        assert!(stated.iter().filter(|of| of.is_as_stated).all(|of| of.process.sigma_mm == 0.3));
+        // White noise of a third of the stated standard deviation contradicts it.
+        let contradicted = drawn(0.0, Some(0.9)).iter().filter(|of| !of.is_as_stated).count();
+        assert!(contradicted >= 196, "{contradicted}");
+    }
+
+    #[test]
+    fn gaps_divide_a_run() {
+        assert_eq!(stretches(&[4, 5, 6, 9, 11, 12]), [0..3, 3..4, 4..6]);
+        assert_eq!(stretches(&[]), [0..0; 0]);
     }
 }

@@ -23,8 +23,8 @@ use abbe_model::session::readings::Readings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use autocorrelation::Autocorrelation;
 pub(crate) use autocorrelation::enlargement_of_mean;
+pub use autocorrelation::{Autocorrelation, Process};
 pub(crate) use stated::silent_channels;
 pub use stated::stated_against_repeats;
 use trends::Trends;

@@ -24,7 +24,7 @@ fn powers(readings: usize) -> usize {
     }
 }
 
-/// The terms of a trend, orthonormal over the given times (Gram–Schmidt, twice). Terms that need more times are zero.
+/// The terms of a trend, orthonormal over the given times. Terms that need more times are zero.
 pub fn trend_terms(times: &[f64]) -> Vec<[f64; TERMS]> {
     let n = times.len() as f64;
     let powers = powers(times.len());
@@ -42,6 +42,12 @@ pub fn trend_terms(times: &[f64]) -> Vec<[f64; TERMS]> {
         })
     };
     let mut q: Vec<[f64; TERMS]> = times.iter().map(terms).collect();
+    orthonormalise(&mut q);
+    q
+}
+
+/// Makes the terms orthonormal (Gram–Schmidt, twice). A term that depends on those before it becomes zero.
+pub(super) fn orthonormalise(q: &mut [[f64; TERMS]]) {
     for i in 0..TERMS {
         for j in (0..i).chain(0..i) {
             let along: f64 = q.iter().map(|row| row[i] * row[j]).sum();
@@ -51,7 +57,6 @@ pub fn trend_terms(times: &[f64]) -> Vec<[f64; TERMS]> {
         let scale = if length > 1e-9 { 1.0 / length } else { 0.0 };
         q.iter_mut().for_each(|row| row[i] *= scale);
     }
-    q
 }
 
 /// The terms of the trend of a run, one row per reading; zero for excluded rows.

@@ -9,8 +9,8 @@ use std::ops::Range;
 use abbe_model::session::Test;
 use statrs::function::gamma::gamma_ur;
 
+use super::PureError;
 use super::trends::MIN_RUN;
-use super::{Autocorrelation, PureError};
 use crate::numerics::median;
 
 /// Half cycles along a run at which the candidate bands begin, and the widths of the bands in half cycles.
@@ -35,7 +35,7 @@ impl PureError {
     /// would count as noise. A band is removed from all tests or from one. The criterion is the periodogram of the
     /// whitened deviations, summed over runs, against the median of all ordinates.
     pub fn without_waves(mut self, tests: &[Test], kept: impl Fn(usize, usize) -> bool) -> PureError {
-        let Some(mut autocorrelation) = self.autocorrelation_up_to(1, tests, &kept) else {
+        let Some(mut coefficients) = self.coefficients_of_first_order(tests, &kept) else {
             return self;
         };
         let runs_of_tests: Vec<Vec<RunRows>> = tests
@@ -49,7 +49,7 @@ impl PureError {
             .collect();
         for runs in std::iter::once(runs_of_tests.concat()).chain(runs_of_tests) {
             for _ in 0..MAX_BANDS {
-                let Some(band) = self.band(&runs, &autocorrelation) else {
+                let Some(band) = self.band(&runs, &coefficients) else {
                     break;
                 };
                 let independent: Vec<f64> = (self.deviations.iter().zip(&self.freedom_of_tests))
@@ -67,23 +67,23 @@ impl PureError {
                 }
                 self.freedom_of_tests.iter_mut().for_each(|freedom| *freedom = freedom.max(0.0));
                 self.count();
-                let Some(of_remaining) = self.autocorrelation_up_to(1, tests, &kept) else {
+                let Some(of_remaining) = self.coefficients_of_first_order(tests, &kept) else {
                     return self;
                 };
-                autocorrelation = of_remaining;
+                coefficients = of_remaining;
             }
         }
         self
     }
 
     /// The most significant band of runs, in half cycles, if any is significant.
-    fn band(&self, runs: &[RunRows], autocorrelation: &Autocorrelation) -> Option<Range<usize>> {
+    fn band(&self, runs: &[RunRows], coefficients: &[f64]) -> Option<Range<usize>> {
         let whitened: Vec<Vec<f64>> = runs
             .iter()
             .map(|RunRows { test, rows }| {
                 let deviation = |row: usize| self.deviations[*test][row].unwrap_or(0.0);
                 let past = |row: usize| -> f64 {
-                    let lags = autocorrelation.coefficients.iter().enumerate();
+                    let lags = coefficients.iter().enumerate();
                     lags.filter(|(lag, _)| row > rows.start + lag).map(|(lag, a)| a * deviation(row - lag - 1)).sum()
                 };
                 rows.clone().map(|row| deviation(row) - past(row)).collect()

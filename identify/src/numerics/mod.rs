@@ -7,6 +7,7 @@
 pub mod circle;
 pub mod evidence;
 pub mod gain;
+pub mod golden_section;
 pub mod least_squares;
 mod median;
 pub mod null_space;

@@ -66,11 +66,12 @@ fn one_sign_for_each_pose() {
 fn a_draw_has_the_spectrum_of_its_coefficients_over_that_of_the_whitening() {
     let mut generator = Pcg64::seed_from_u64(6);
     let pulse = || [1.0, 0.0, 0.0, 0.0, 0.0];
-    let answer = |found: &[f64], first: f64, u: f64, generator: &mut Pcg64| {
+    let answer = |spectrum: Spectrum, generator: &mut Pcg64| {
         let mut values = pulse();
-        Spectrum { found: found.to_vec(), first, u }.give(&mut values, generator);
+        spectrum.give(&mut values, generator);
         values
     };
+    let significant = |found: &[f64], sum_u: f64| Spectrum::Significant { coefficients: found.to_vec(), sum_u };
     let series = |a: [f64; 3], own: [f64; 3]| {
         let mut series = [0.0; 5];
         for t in 0..5 {
@@ -82,20 +83,20 @@ fn a_draw_has_the_spectrum_of_its_coefficients_over_that_of_the_whitening() {
     let near = |found: [f64; 5], expected: [f64; 5]| {
         assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14), "{found:?} {expected:?}");
     };
-    let one = answer(&[0.5], 0.3, 0.0, &mut generator);
-    near(one, [1.0, -0.2, -0.06, -0.018, -0.0054]);
-    let two = answer(&[0.5, 0.2], 0.3, 0.0, &mut generator);
-    near(two, series([1.0, -0.5, -0.2], [1.0, -0.3, -0.2]));
-    // The same coefficients leave the draw as it is, and so does an estimate of nothing without an uncertainty.
-    near(answer(&[0.5, 0.2], 0.5, 0.0, &mut generator), pulse());
-    near(answer(&[], 0.0, 0.0, &mut generator), pulse());
+    let one = Spectrum::NotSignificant(vec![(0.3, 0.8)]);
+    near(answer(one, &mut generator), [0.8, 0.24, 0.072, 0.0216, 0.00648]);
+    // The same coefficients leave the draw as it is.
+    near(answer(significant(&[0.5, 0.2], 0.0), &mut generator), pulse());
+    near(answer(Spectrum::White, &mut generator), pulse());
     // However uncertain, the sum of the coefficients stays that of a stationary process, at either bound.
     let mut seen = [false; 2];
     for _ in 0..50 {
-        let far = answer(&[0.5, 0.2], 0.5, 1e6, &mut generator);
+        let far = answer(significant(&[0.5, 0.2], 1e6), &mut generator);
         let bounds = [MAX_AR_SUM, -MAX_AR_SUM];
         let at = bounds.iter().position(|sum| (far[1] - (sum - 0.2 - 0.5)).abs() < 1e-9);
-        seen[at.unwrap_or_else(|| panic!("{far:?}"))] = true;
+        let at = at.unwrap_or_else(|| panic!("{far:?}"));
+        near(far, series([1.0, -0.5, -0.2], [1.0, 0.2 - bounds[at], -0.2]));
+        seen[at] = true;
     }
     assert_eq!(seen, [true; 2]);
 }
@@ -135,7 +136,7 @@ fn blocks_of_draws_are_white_although_deviations_lack_their_trend() {
             Stretch::without_trend(noise, trend, 1)
         })
         .collect();
-    let mut draws = NoiseDraws { pool, singles: OnceLock::new(), spectrum: Spectrum::white(), freedom: None };
+    let mut draws = NoiseDraws { pool, singles: OnceLock::new(), spectrum: Spectrum::White, freedom: None };
     let variance_of_sums = |draws: &NoiseDraws, generator: &mut Pcg64| {
         let values = draws.blocks(400_000, BLOCK, generator);
         let rough = values.windows(2).map(|two| (two[1] - two[0]).powi(2)).sum::<f64>() / (2.0 * 399_999.0);
@@ -161,8 +162,7 @@ fn draws_differ_by_the_uncertainty_of_the_noise_model() {
     const ROWS: usize = 4000;
     const DRAWS: usize = 400;
     let mut generator = Pcg64::seed_from_u64(4);
-    let draws = |freedom: Option<f64>, first: f64, u: f64, generator: &mut Pcg64| -> Vec<(f64, f64)> {
-        let spectrum = Spectrum { first, u, ..Spectrum::white() };
+    let draws = |freedom: Option<f64>, spectrum: Spectrum, generator: &mut Pcg64| -> Vec<(f64, f64)> {
         let source = NoiseDraws { pool: Vec::new(), singles: OnceLock::new(), spectrum, freedom };
         (0..DRAWS)
             .map(|_| {
@@ -178,13 +178,23 @@ fn draws_differ_by_the_uncertainty_of_the_noise_model() {
         (mean, (of.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / DRAWS as f64).sqrt())
     };
     // ν/χ² has the mean ν/(ν − 2) and the variance 2 ν²/((ν − 2)² (ν − 4)).
-    let (mean, scatter) = moments(draws(Some(50.0), 0.0, 0.0, &mut generator).iter().map(|d| d.0).collect());
+    let (mean, scatter) = moments(draws(Some(50.0), Spectrum::White, &mut generator).iter().map(|d| d.0).collect());
     assert!((mean - 50.0 / 48.0).abs() < 0.05, "{mean}");
     assert!((scatter / (2.0 * 2500.0 / (48.0 * 48.0 * 46.0_f64)).sqrt() - 1.0).abs() < 0.25, "{scatter}");
-    let correlated = draws(None, 0.3, 0.1, &mut generator);
+    let process = |first: f64, innovation_mm: f64| Process { coefficients: vec![first], sigma_mm: 1.0, innovation_mm };
+    // 0.2 and 0.4: a mean of 0.3 and a scatter of 0.1, and noise of which a quarter more is not predicted.
+    let possible = [0.2, 0.4_f64].map(|first| process(first, 1.25 * (1.0 - first * first).sqrt()));
+    let spectrum = Spectrum::not_significant(&possible, 1.0, false);
+    let correlated = draws(None, spectrum, &mut generator);
     let (mean, scatter) = moments(correlated.iter().map(|d| d.1).collect());
     assert!((mean - 0.3).abs() < 0.03 && (scatter / 0.1 - 1.0).abs() < 0.25, "{mean} {scatter}");
-    // The variance of a reading stays that of the noise.
     let (mean, _) = moments(correlated.iter().map(|d| d.0).collect());
+    assert!((mean - 1.25 * 1.25).abs() < 0.03, "{mean}");
+    // Blocks have the mean autocorrelation, and the variance of a reading is that of the noise.
+    let spectrum = Spectrum::not_significant(&possible, 1.0, true);
+    let in_blocks = draws(None, spectrum, &mut generator);
+    let (mean, scatter) = moments(in_blocks.iter().map(|d| d.1).collect());
+    assert!(mean.abs() < 0.03 && (scatter / 0.1 - 1.0).abs() < 0.25, "{mean} {scatter}");
+    let (mean, _) = moments(in_blocks.iter().map(|d| d.0).collect());
     assert!((mean - 1.0).abs() < 0.02, "{mean}");
 }

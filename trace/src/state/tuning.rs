@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use abbe_identify::error::IdentifyError;
+use abbe_identify::numerics::golden_section::highest;
 use abbe_identify::numerics::parallel;
 use abbe_identify::numerics::tails::most_evidence;
 use abbe_model::effect::Effect;
@@ -216,27 +217,4 @@ impl SearchState<'_> {
         }
         (best > before * (1.0 + 1e-6)).then_some((Tuned { original, effect, selection_penalty }, best))
     }
-}
-
-/// The maximum of a line search between 0 and 1, and its argument, by golden section (Kiefer, Proc. Am. Math. Soc. 4
-/// (1953) 502).
-fn highest<T>(value_at: impl Fn(f64) -> (f64, T), steps: usize) -> (f64, T) {
-    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    let (mut a, mut b) = (0.0, 1.0);
-    let (mut c, mut d) = (b - golden * (b - a), a + golden * (b - a));
-    let (mut at_c, mut at_d) = (value_at(c), value_at(d));
-    for _ in 0..steps {
-        if at_c.0 > at_d.0 {
-            (b, d) = (d, c);
-            at_d = at_c;
-            c = b - golden * (b - a);
-            at_c = value_at(c);
-        } else {
-            (a, c) = (c, d);
-            at_c = at_d;
-            d = a + golden * (b - a);
-            at_d = value_at(d);
-        }
-    }
-    if at_c.0 > at_d.0 { at_c } else { at_d }
 }
