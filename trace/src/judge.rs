@@ -48,7 +48,7 @@ impl RefittedModel {
         // residual of the declared model contains the effects and overstates the noise.
         let estimated: Vec<Effect> = effects.iter().cloned().map(Effect::with_estimated_numbers).collect();
         let (mut after, mut after_fit) = prepare_with(&problem.session, &estimated, options.seed)?;
-        if noise_is_from_residual(problem, &after) {
+        if noise_is_from_search(problem, &after) {
             after.noise = problem.noise.clone();
             after_fit = refit(&mut after, &after_fit)?;
         }
@@ -80,12 +80,16 @@ fn selected_effects<'s>(search: &'s SearchState<'_>) -> impl Iterator<Item = &'s
 /// that a fit of the session with the found effects gives the same uncertainties.
 const SAME_NOISE: f64 = 0.1;
 
-/// Whether the search used a noise model from repeats along runs that differs from that of a fit: autocorrelated, or
-/// with another standard deviation.
-fn noise_is_from_residual(search: &Problem, fit: &Problem) -> bool {
+/// Whether the noise of the search is not that of a fit: repeats contradict the stated noise, or beside waves that vary from
+/// run to run they give another standard deviation.
+fn noise_is_from_search(search: &Problem, fit: &Problem) -> bool {
     let (of_search, of_fit) = (&search.noise, &fit.noise);
     let of_one_size = (of_search.sigma_mm / of_fit.sigma_mm - 1.0).abs() < SAME_NOISE;
-    !of_search.ar_coefficients.is_empty() || (of_search.source == NoiseSource::Repeats && !of_one_size)
+    match (of_search.source, of_fit.source) {
+        (NoiseSource::Repeats, NoiseSource::Repeats) if !of_fit.ar_coefficients.is_empty() => false,
+        (NoiseSource::Repeats, _) => !(of_search.ar_coefficients.is_empty() && of_one_size),
+        _ => false,
+    }
 }
 
 /// The structure in the residual of a fit.

@@ -1,25 +1,19 @@
 //! Estimates the noise model of a trace from repeats: standard deviation and autocorrelation.
 
-use abbe_identify::noise::{Noise, NoiseSource, PureError};
+use abbe_identify::noise::{Noise, NoiseSource, along_runs};
 use abbe_identify::problem::Problem;
 
 use super::constants::{MIN_AGAINST_STATED, SCATTER};
-use super::policy::Policy;
 
 /// Sets the noise standard deviation and autocorrelation from repeats, if there are enough. The standard deviation of
 /// white noise replaces a stated one if more of them determine it, that of autocorrelated noise only if they contradict the
 /// stated one: little of the slow part is left in their deviations. Returns whether this changed the noise by more than its
 /// sampling scatter.
 pub(crate) fn estimate_noise_model(problem: &mut Problem, residuals: &[Vec<f64>]) -> bool {
-    if !Policy::of(problem).noise_of_repeats {
-        return false;
-    }
-    let kept = |test: usize, row: usize| !problem.rejected[test][row];
-    let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
-    let stated_mm = problem.session.stated_noise_mm();
-    let Some(estimated) = pure.autocorrelation(stated_mm, &problem.tests, kept) else {
+    let Some((pure, estimated)) = along_runs(problem, residuals) else {
         return false;
     };
+    let stated_mm = problem.session.stated_noise_mm();
     let white = estimated.process.coefficients.is_empty();
     let (sigma_mm, source) = match (stated_mm, pure.sigma_mm()) {
         (Some(stated_mm), _) if white && pure.freedom < MIN_AGAINST_STATED => (stated_mm, NoiseSource::Stated),

@@ -37,8 +37,6 @@ pub struct Policy {
     pub max_effects: usize,
     /// Where the null draws come from.
     pub null: NullSource,
-    /// Whether repeats determine noise standard deviation and autocorrelation.
-    pub noise_of_repeats: bool,
     /// Whether the residual is tested for structure. For poses the residual always has structure, so that the test
     /// cannot decide.
     pub tests_structure: bool,
@@ -72,7 +70,6 @@ const RUNS: Policy = Policy {
     significance: SIGNIFICANCE,
     max_effects: 12,
     null: NullSource::Repeats,
-    noise_of_repeats: true,
     tests_structure: true,
     in_residual_variance: false,
     every_addition_lowers_heldout: false,
@@ -90,7 +87,6 @@ const POSES: Policy = Policy {
     significance: SIGNIFICANCE,
     max_effects: 200,
     null: NullSource::SignFlips,
-    noise_of_repeats: false,
     tests_structure: false,
     in_residual_variance: true,
     every_addition_lowers_heldout: true,

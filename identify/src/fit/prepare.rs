@@ -12,8 +12,7 @@ use super::numbers::{fit_with_numbers, intervals};
 use super::{Fit, further_steps, positions};
 use crate::error::IdentifyError;
 use crate::heldout::{rms_by_unit_mm, rms_mm};
-use crate::noise::outliers;
-use crate::noise::{Noise, NoiseSource, PureError, ShownNoise};
+use crate::noise::{self, Noise, NoiseSource, PureError, ShownNoise, outliers};
 use crate::numerics::triangle::Triangle;
 use crate::parameters::Role;
 use crate::plausibility;
@@ -27,9 +26,11 @@ const MIN_NOISE_MM: f64 = MIN_UM * 1e-3;
 const MAX_ROUNDS: usize = 6;
 /// Relative change of the noise standard deviation at which the rounds stop.
 const NOISE_TOLERANCE: f64 = 1e-4;
+/// Change of a coefficient of its autocorrelation at which the rounds stop.
+const COEFFICIENT_TOLERANCE: f64 = 1e-3;
+
 /// Prepares and fits a session. The noise is the stated one, that of repeats or of several targets at each pose, or that of
-/// the residual. Outliers are
-/// excluded.
+/// the residual, with the autocorrelation that repeats along runs show. Outliers are excluded.
 ///
 /// # Errors
 /// See [`Problem::new`]; also if the iterations do not converge.
@@ -143,10 +144,10 @@ fn prepare_at_lever(session: &Session, effects: &[Effect], seed: u64) -> Result<
         problem.add_effect(effect)?;
     }
     if families(&problem.parameters).is_empty() {
-        return settled(problem, stated.is_some(), floor);
+        return settled(problem, floor);
     }
     let (without, kept) = problem.without_families();
-    let (without, fit) = settled(without, stated.is_some(), floor)?;
+    let (without, fit) = settled(without, floor)?;
     let mut start = vec![0.0; problem.parameters.list.len()];
     kept.iter().zip(&fit.beta).for_each(|(j, value)| start[*j] = *value);
     (problem.noise, problem.rejected) = (without.noise, without.rejected);
@@ -158,8 +159,8 @@ fn prepare_at_lever(session: &Session, effects: &[Effect], seed: u64) -> Result<
 }
 
 /// Fits a problem, in turn with its noise and its outliers.
-fn settled(mut problem: Problem, stated: bool, floor: f64) -> Result<(Problem, Fit), IdentifyError> {
-    if !stated {
+fn settled(mut problem: Problem, floor: f64) -> Result<(Problem, Fit), IdentifyError> {
+    if problem.session.stated_noise_mm().is_none() {
         problem.noise =
             Noise::white(nominal_residual_mm(&problem)?.max(floor).max(MIN_NOISE_MM), NoiseSource::Residual);
     }
@@ -171,9 +172,8 @@ fn settled(mut problem: Problem, stated: bool, floor: f64) -> Result<(Problem, F
         let rejected = outliers::reject(&problem, &fit.residuals);
         let unchanged = rejected == problem.rejected;
         problem.rejected = rejected;
-        let noise = if stated { problem.noise.clone() } else { estimated_noise(&problem, &fit, floor) };
-        let settled = (noise.sigma_mm / problem.noise.sigma_mm - 1.0).abs() < NOISE_TOLERANCE;
-        if settled && unchanged {
+        let noise = noise(&problem, &fit, floor);
+        if unchanged && is_settled(&noise, &problem.noise) {
             break;
         }
         problem.noise = noise;
@@ -277,6 +277,31 @@ fn nominal_residual_mm(problem: &Problem) -> Result<f64, IdentifyError> {
     let count = problem.scalars() as f64;
     let sum_of_squares = Triangle::of(rows).parts().2 + rest;
     Ok((sum_of_squares / count.max(1.0)).sqrt() * problem.noise.sigma_mm)
+}
+
+/// Whether two noises differ by less than the rounds can change.
+fn is_settled(noise: &Noise, before: &Noise) -> bool {
+    let (own, of_before) = (&noise.ar_coefficients, &before.ar_coefficients);
+    (noise.sigma_mm / before.sigma_mm - 1.0).abs() < NOISE_TOLERANCE
+        && own.len() == of_before.len()
+        && own.iter().zip(of_before).all(|(own, of_before)| (own - of_before).abs() < COEFFICIENT_TOLERANCE)
+}
+
+/// The noise that the session states or the readings show. The autocorrelation is that of repeats along runs. If these
+/// contradict the stated standard deviation, they may hold an effect that acts in one run, which is no noise: what is stated
+/// then counts as white noise.
+fn noise(problem: &Problem, fit: &Fit, floor: f64) -> Noise {
+    let stated_mm = problem.session.stated_noise_mm();
+    let white = match stated_mm {
+        Some(sigma_mm) => Noise::white(sigma_mm, NoiseSource::Stated),
+        None => estimated_noise(problem, fit, floor),
+    };
+    let Some((_, shown)) = noise::along_runs(problem, &fit.residuals) else { return white };
+    if shown.process.coefficients.is_empty() || shown.is_as_stated != stated_mm.is_some() {
+        return white;
+    }
+    let sigma_mm = shown.process.sigma_mm.max(floor).max(MIN_NOISE_MM);
+    Noise { sigma_mm, ar_coefficients: shown.process.coefficients, ar_sum_u: shown.sum_u, ..white }
 }
 
 fn estimated_noise(problem: &Problem, fit: &Fit, floor: f64) -> Noise {

@@ -25,6 +25,7 @@ use nalgebra::{SMatrix, SVector};
 use super::PureError;
 use super::trends::{TERMS, Trends, orthonormalise};
 use crate::numerics::golden_section::highest;
+use crate::problem::Problem;
 
 /// Maximum autoregressive order.
 const MAX_ORDER: usize = 3;
@@ -67,6 +68,18 @@ pub struct Process {
     pub sigma_mm: f64,
     /// Standard deviation of the part that earlier values do not predict, mm.
     pub innovation_mm: f64,
+}
+
+/// The pure error of readings along runs, and the autocorrelation that it shows. `None` for independent poses and without
+/// enough repeats. `residuals` are those of any model, mm, test by test.
+pub fn along_runs(problem: &Problem, residuals: &[Vec<f64>]) -> Option<(PureError, Autocorrelation)> {
+    if problem.folds.kind.is_poses() {
+        return None;
+    }
+    let kept = |test: usize, row: usize| !problem.rejected[test][row];
+    let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
+    let shown = pure.autocorrelation(problem.session.stated_noise_mm(), &problem.tests, kept)?;
+    Some((pure, shown))
 }
 
 impl PureError {

@@ -24,7 +24,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use autocorrelation::enlargement_of_mean;
-pub use autocorrelation::{Autocorrelation, Process};
+pub use autocorrelation::{Autocorrelation, Process, along_runs};
 pub(crate) use stated::silent_channels;
 pub use stated::stated_against_repeats;
 use trends::Trends;

@@ -78,6 +78,23 @@ impl<'p> Refit<'p> {
         })
     }
 
+    /// The inputs with the deviations of readings as the autocorrelation of the noise makes them, `x_t = Σ a_k x_{t−k} + e_t`,
+    /// from independent ones of the variance of the noise.
+    fn along_runs(&self, inputs: &[f64]) -> Vec<f64> {
+        let noise = &self.problem.noise;
+        let mut inputs = inputs.to_vec();
+        let innovation = noise.innovation_mm() / noise.sigma_mm;
+        for block in self.blocks.iter().filter(|_| !noise.ar_coefficients.is_empty()) {
+            let start = self.starts[block.test];
+            for row in block.rows.clone().skip(noise.ar_coefficients.len()) {
+                let lags = noise.ar_coefficients.iter().enumerate();
+                let past: f64 = lags.map(|(lag, a)| a * inputs[start + row - lag - 1]).sum();
+                inputs[start + row] = past + innovation * inputs[start + row];
+            }
+        }
+        inputs
+    }
+
     /// The identifiable coordinates with the best fit to the inputs.
     fn fitted(&self, deviations: &[f64]) -> Result<Vec<f64>, IdentifyError> {
         let drawn = SimulatedFit { refit: self, deviations };
@@ -119,7 +136,7 @@ impl Function for Refit<'_> {
     }
 
     fn evaluate(&self, inputs: &[f64], outputs: &mut [f64], (): &mut ()) {
-        let Ok(z) = self.fitted(inputs) else {
+        let Ok(z) = self.fitted(&self.along_runs(inputs)) else {
             outputs.fill(f64::NAN);
             return;
         };
@@ -236,6 +253,28 @@ mod tests {
 
     use super::*;
     use crate::fit::prepare;
+
+    /// Whitening the deviations of readings gives back the independent ones, over their standard deviation.
+    #[test]
+    fn deviations_have_the_autocorrelation_of_the_noise() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
+        let (mut problem, fit) = prepare(&session, 1).unwrap();
+        problem.noise.ar_coefficients = vec![0.9, -0.2];
+        let refit = Refit::new(&problem, &fit).unwrap();
+        let independent: Vec<f64> = refit.u.iter().enumerate().map(|(i, u)| u * ((i * 7) as f64).sin()).collect();
+        let drawn = refit.along_runs(&independent);
+        for block in &refit.blocks {
+            let start = refit.starts[block.test] + block.rows.start;
+            let column = Mat::from_fn(block.rows.len(), 1, |i, _| drawn[start + i]);
+            let white = problem.whitened(column, &(0..block.rows.len()).collect::<Vec<_>>());
+            for i in 0..block.rows.len() {
+                let expected = independent[start + i] / problem.noise.sigma_mm;
+                assert!((white[(i, 0)] - expected).abs() < 1e-9, "{} {expected}", white[(i, 0)]);
+            }
+        }
+        assert_eq!(drawn[refit.distances..], independent[refit.distances..]);
+    }
 
     /// Three computations for one simulated session agree: the sum of squares of its rows, that of its residuals, and
     /// its gradient against differences.
