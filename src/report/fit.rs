@@ -42,7 +42,8 @@ pub fn report(
     let opening = statements::opening(statements, &problem.session, result.degrees_of_freedom, commands);
     let rank = rank(result.identifiable.len(), result.parameter_count, result.rank);
     let noise = noise(result.noise_um, result.reading_unit, result.noise_source);
-    let extent = format!("{}, {noise}; {rank}.", counted(result.readings, "reading"));
+    let along_runs = quality::autocorrelated(&result.noise_ar_coefficients);
+    let extent = format!("{}, {noise}{along_runs}; {rank}.", counted(result.readings, "reading"));
     let failed = conformity::failed(result.conformity.as_ref());
     let contradicted = plausibility::headline(&result.plausibility);
     report
@@ -118,9 +119,10 @@ fn quality(result: &FitResult) -> Quality<'_> {
 fn method(result: &FitResult) -> String {
     format!(
         "Least squares on the kinematic chain. All parameters are estimated together in the identifiable subspace. The \
-         covariance follows from the law of propagation of uncertainty (JCGM 100, JCGM 102). {}. Held-out error: each \
+         covariance follows from the law of propagation of uncertainty (JCGM 100, JCGM 102). {}{}. Held-out error: each \
          fold leaves out {}.",
         noise_sentence(result.noise_um, result.reading_unit, result.noise_source),
+        quality::autocorrelated(&result.noise_ar_coefficients),
         result.heldout_by
     )
 }

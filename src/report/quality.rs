@@ -147,6 +147,11 @@ pub fn noise(noise_um: f64, unit: ReadingUnit, source: NoiseSource) -> String {
     }
 }
 
+/// What follows the noise if the readings of a run are correlated.
+pub fn autocorrelated(coefficients: &[f64]) -> &'static str {
+    if coefficients.is_empty() { "" } else { ", autocorrelated along runs" }
+}
+
 /// The noise of a result and its source. The residual of a model is not called noise.
 pub fn noise_sentence(noise_um: f64, unit: ReadingUnit, source: NoiseSource) -> String {
     match source {

@@ -103,11 +103,12 @@ fn method(result: &TraceResult) -> String {
     format!(
         "The search screens {} candidate effects of the library against the residual of the declared model. {} of them \
          are detectable in these readings. An effect is added if the same search rarely finds an effect as good in \
-         readings without structure. All parameters are then refitted together. {}. Held-out error: each fold leaves \
+         readings without structure. All parameters are then refitted together. {}{}. Held-out error: each fold leaves \
          out {}; the search is repeated in each fold.",
         integer(result.candidates),
         integer(result.candidates_detectable),
         noise_sentence(result.noise_um, result.reading_unit, result.noise_source),
+        quality::autocorrelated(&result.noise_ar_coefficients),
         result.heldout_by
     )
 }
@@ -237,7 +238,8 @@ fn next(trace: &TraceOutcome, commands: &Commands) -> Vec<(String, String)> {
 /// The noise and its source in words. A residual is not called noise.
 fn noise(result: &TraceResult) -> String {
     if result.noise_source.judges() || result.effects.is_empty() {
-        return quality::noise(result.noise_um, result.reading_unit, result.noise_source);
+        let along_runs = quality::autocorrelated(&result.noise_ar_coefficients);
+        return quality::noise(result.noise_um, result.reading_unit, result.noise_source) + along_runs;
     }
     format!(
         "residual of the declared model {}, with the effects {} (no noise stated, no repeats)",

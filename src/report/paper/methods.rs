@@ -29,9 +29,18 @@ pub fn part(study: &Study) -> Part {
             NoiseSource::Targets => "is estimated from the distances between the targets at each pose",
             _ => "is estimated from the residual",
         };
+        let coefficients: Vec<String> =
+            result.noise_ar_coefficients.iter().map(|coefficient| format!("{coefficient:.2}")).collect();
+        let along_runs = match coefficients.len() {
+            0 => String::new(),
+            order => format!(
+                " Along a run the noise is an autoregression of order {order} ({}), from repeated readings.",
+                coefficients.join(", ")
+            ),
+        };
         report.key(format!(
             "The fit of {} has a root mean square residual of {} and of {} for held-out readings ({} left out in turn). \
-             The noise standard deviation of {} {source}. χ² is {:.0} for {} degrees of freedom (Birge ratio {:.2}).{enlarged}",
+             The noise standard deviation of {} {source}.{along_runs} χ² is {:.0} for {} degrees of freedom (Birge ratio {:.2}).{enlarged}",
             counted(result.readings, "reading"),
             of_readings(result.rms_um, result.reading_unit),
             of_readings(result.heldout_rms_um, result.reading_unit),
