@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use abbe::files::{ReadOptions, session};
-use abbe::identify::fit::prepare;
-use abbe::identify::results::{EffectName, TraceResult, TraceVerdict};
+use abbe::identify::fit::{prepare, report};
+use abbe::identify::results::{EffectName, GoodnessVerdict, TraceResult, TraceVerdict};
 use rayon::prelude::*;
 
 use super::judging::short;
@@ -147,6 +147,62 @@ fn nothing_is_claimed_without_an_effect() {
         }
     }
     assert!(all.claimed.is_consistent_with_at_most(0.01), "{}", all.claimed);
+}
+
+/// How far location errors of a fit lie from the truth, in units of their u.
+#[derive(Clone, Copy, Debug, Default)]
+struct PullsOfFits {
+    squares: f64,
+    beyond_2: Rate,
+    beyond_3: Rate,
+    agrees: Rate,
+}
+
+/// The uncertainties of a fit hold in any noise, and what it says of the residual does not depend on autocorrelation.
+#[test]
+fn a_fit_states_its_uncertainties_in_any_noise() {
+    if skipped("a_fit_states_its_uncertainties_in_any_noise") {
+        return;
+    }
+    let first = first_number();
+    let pulls_of = |number: usize| -> (Condition, bool, Vec<f64>) {
+        let condition = Condition::of(number);
+        let draw = condition.recipe(number).draw();
+        let folder = tempfile::tempdir().unwrap();
+        draw.write(folder.path()).unwrap();
+        let read = session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
+        let (problem, fitted) = prepare(&read, 1).unwrap();
+        let result = report(&problem, &fitted).unwrap();
+        let pulls = draw.truth.piges().filter_map(|(id, value, _)| {
+            let parameter = result.parameters.iter().find(|parameter| parameter.id == id)?;
+            Some((parameter.value - value) / parameter.u)
+        });
+        (condition, result.outcome.goodness.verdict != GoodnessVerdict::Exceeds, pulls.collect())
+    };
+    let fits: Vec<(Condition, bool, Vec<f64>)> =
+        (first..first + 3 * sessions()).into_par_iter().map(pulls_of).collect();
+    let mut by_condition = BTreeMap::<String, PullsOfFits>::new();
+    for (condition, agrees, pulls) in &fits {
+        for row in condition.rows().into_iter().chain(["all".to_string()]) {
+            let of_row = by_condition.entry(row).or_default();
+            of_row.agrees.count(*agrees);
+            for pull in pulls {
+                of_row.squares += pull * pull;
+                of_row.beyond_2.count(pull.abs() > 2.0);
+                of_row.beyond_3.count(pull.abs() > 3.0);
+            }
+        }
+    }
+    println!(
+        "| condition | rms of pulls | beyond 2 | beyond 3 | the residual agrees with the noise |\n|---|---|---|---|---|"
+    );
+    for (row, PullsOfFits { squares, beyond_2, beyond_3, agrees }) in &by_condition {
+        println!("| {row} | {:.2} | {beyond_2} | {beyond_3} | {agrees} |", (squares / beyond_2.of as f64).sqrt());
+    }
+    for (row, of_row) in by_condition.iter().filter(|(row, _)| row.starts_with("noise")) {
+        assert!(of_row.beyond_2.is_consistent_with_at_most(0.065), "{row}: {}", of_row.beyond_2);
+        assert!(of_row.agrees.is_consistent_with_at_least(0.97), "{row}: {}", of_row.agrees);
+    }
 }
 
 /// Sessions of 120 readings in runs of 6 to 17, one reading of a hundred 5 to 30 µm off: the fit excludes these, and hardly
