@@ -482,8 +482,8 @@ mod tests {
                 minus_two_ln += ln_determinant + (d.transpose() * &inverse * &d)[(0, 0)] / 0.49;
                 freedom += (n - first) as f64;
             }
-            let stretches = if is_whole { vec![0..n] } else { vec![0..11, 11..n] };
-            alike.push(AlikeRuns { stretches, trend: q, runs, independent: 1.0 });
+            let rows: Vec<usize> = (0..n).map(|t| place(t, is_whole)).collect();
+            alike.push(AlikeRuns { stretches: stretches(&rows), trend: q, runs, independent: 1.0 });
         }
         minus_two_ln += freedom * 0.49_f64.ln();
         let fitted = DetrendedRuns { alike }.fit(&[correlation[1], a[1]], Some(0.7));
@@ -505,7 +505,7 @@ mod tests {
             values.iter().map(|value| sigma * value).collect()
         };
         let alike = lengths.iter().map(|n| AlikeRuns {
-            stretches: vec![0..*n],
+            stretches: stretches(&(0..*n).collect::<Vec<_>>()),
             trend: trend(*n),
             runs: vec![run(*n, generator)],
             independent: 1.0,
