@@ -136,9 +136,9 @@ impl NoiseDraws {
         let pool = if of_repeats { pool_of_repeats(problem, &pure) } else { pool_of_residual(problem, residuals) };
         let coefficients = problem.noise.ar_coefficients.clone();
         let spectrum = if coefficients.is_empty() {
-            let estimated = pure.autocorrelation(problem.session.stated_noise_mm(), &problem.tests, kept);
-            estimated.map_or(Spectrum::White, |estimated| {
-                Spectrum::not_significant(&estimated.possible, problem.noise.sigma_mm, of_repeats)
+            let possible = pure.possible_processes(problem.session.stated_noise_mm(), &problem.tests, kept);
+            possible.map_or(Spectrum::White, |possible| {
+                Spectrum::not_significant(&possible, problem.noise.sigma_mm, of_repeats)
             })
         } else {
             Spectrum::Significant { coefficients, sum_u: problem.noise.ar_sum_u }

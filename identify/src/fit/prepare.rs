@@ -297,10 +297,11 @@ fn noise(problem: &Problem, fit: &Fit, floor: f64) -> Noise {
         None => estimated_noise(problem, fit, floor),
     };
     let Some((_, shown)) = noise::along_runs(problem, &fit.residuals) else { return white };
-    if shown.process.coefficients.is_empty() || shown.is_as_stated != stated_mm.is_some() {
+    let sigma_mm = shown.process.sigma_mm;
+    let is_rounding = sigma_mm < floor.max(MIN_NOISE_MM);
+    if shown.process.coefficients.is_empty() || shown.is_as_stated != stated_mm.is_some() || is_rounding {
         return white;
     }
-    let sigma_mm = shown.process.sigma_mm.max(floor).max(MIN_NOISE_MM);
     Noise { sigma_mm, ar_coefficients: shown.process.coefficients, ar_sum_u: shown.sum_u, ..white }
 }
 

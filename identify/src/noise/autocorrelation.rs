@@ -3,7 +3,7 @@
 //! Removing a trend from every run removes slow noise too: with a coefficient of 0.8 and a hundred readings per run, more
 //! than half of its slow part. The autoregression is therefore estimated from what the trend leaves. For `n` deviations
 //! `d` of a run without the orthonormal terms `Q` of its trend, the restricted likelihood is (Harville, J. Am. Stat. Assoc.
-//! 72 (1977) 320, Eq. 4.2)
+//! 72 (1977) 320)
 //!
 //! ```text
 //! −2 ln L = m ln σ² + ln |R| + ln |QᵀR⁻¹Q| + dᵀPd/σ²,   m = n − rank Q,
@@ -51,12 +51,10 @@ const POSSIBLE: usize = 20;
 pub struct Autocorrelation {
     /// The estimate. White if no coefficient is significant.
     pub process: Process,
-    /// Standard uncertainty of the sum of the coefficients; of the first one if none is significant.
+    /// Standard uncertainty of the sum of the coefficients; 0 if none is significant.
     pub sum_u: f64,
     /// Whether the standard deviation is the stated one, which the repeats do not contradict.
     pub is_as_stated: bool,
-    /// Processes of first or higher order that are equally probable.
-    pub possible: Vec<Process>,
 }
 
 /// An autoregressive process.
@@ -92,7 +90,20 @@ impl PureError {
         tests: &[Test],
         kept: impl Fn(usize, usize) -> bool,
     ) -> Option<Autocorrelation> {
-        Some(DetrendedRuns::of(self, tests, kept)?.autocorrelation(MAX_ORDER, stated_mm))
+        let runs = DetrendedRuns::of(self, tests, kept)?;
+        Some(runs.autocorrelation(&runs.estimate(MAX_ORDER, stated_mm)))
+    }
+
+    /// Equally probable processes, of first order if no coefficient is significant. `None` and `stated_mm` as for
+    /// [`PureError::autocorrelation`].
+    pub fn possible_processes(
+        &self,
+        stated_mm: Option<f64>,
+        tests: &[Test],
+        kept: impl Fn(usize, usize) -> bool,
+    ) -> Option<Vec<Process>> {
+        let runs = DetrendedRuns::of(self, tests, kept)?;
+        Some(runs.possible_processes(&runs.estimate(MAX_ORDER, stated_mm)))
     }
 
     /// The coefficients of at most first order.
@@ -101,7 +112,8 @@ impl PureError {
         tests: &[Test],
         kept: impl Fn(usize, usize) -> bool,
     ) -> Option<Vec<f64>> {
-        Some(DetrendedRuns::of(self, tests, kept)?.autocorrelation(1, None).process.coefficients)
+        let runs = DetrendedRuns::of(self, tests, kept)?;
+        Some(runs.autocorrelation(&runs.estimate(1, None)).process.coefficients)
     }
 }
 
@@ -164,43 +176,63 @@ impl DetrendedRuns {
         (pairs >= MIN_PAIRS && !is_constant).then_some(DetrendedRuns { alike })
     }
 
-    fn autocorrelation(&self, most: usize, stated_mm: Option<f64>) -> Autocorrelation {
-        let stated_mm = stated_mm.filter(|sigma_mm| {
-            let [with_stated, free] = [Some(*sigma_mm), None].map(|stated_mm| self.best(&[0.0], 0, stated_mm).0);
-            // White noise of another standard deviation has as many parameters.
-            with_stated - free < SIGNIFICANT && with_stated < self.fit(&[], None).minus_two_ln
-        });
+    /// The partial autocorrelations with the greatest likelihood, up to the last significant order.
+    fn estimate(&self, most: usize, stated_mm: Option<f64>) -> Estimate {
+        let free = self.best(&[0.0], 0, None);
+        let white = self.fit(&[], None).minus_two_ln;
+        let as_stated = stated_mm.map(|sigma_mm| (sigma_mm, self.best(&[0.0], 0, Some(sigma_mm))));
+        // White noise of another standard deviation has as many parameters.
+        let (stated_mm, first, mut least) = match as_stated {
+            Some((sigma_mm, first)) if first.0 - free.0 < SIGNIFICANT && first.0 < white => {
+                (Some(sigma_mm), first, self.fit(&[], Some(sigma_mm)).minus_two_ln)
+            }
+            _ => (None, free, white),
+        };
         let mut partials: Vec<f64> = Vec::new();
-        let mut least = self.fit(&partials, stated_mm).minus_two_ln;
-        let mut first = 0.0;
         for needed in [SIGNIFICANT, SIGNIFICANT_FURTHER, SIGNIFICANT_FURTHER].into_iter().take(most) {
             let mut further = [&partials[..], &[0.0]].concat();
-            let order = further.len();
-            // The partial autocorrelations hardly depend on each other.
             let mut value = least;
-            for k in (0..order).rev() {
-                (value, further[k]) = self.best(&further, k, stated_mm);
-            }
-            if order == 1 {
-                first = further[0];
+            if partials.is_empty() {
+                (value, further[0]) = first;
+            } else {
+                // The partial autocorrelations hardly depend on each other.
+                for k in (0..further.len()).rev() {
+                    (value, further[k]) = self.best(&further, k, stated_mm);
+                }
             }
             if least - value < needed {
                 break;
             }
             (partials, least) = (further, value);
         }
-        let is_white = partials.is_empty();
-        let around = if is_white { vec![first] } else { partials.clone() };
-        let posterior = self.posterior(around, stated_mm);
+        Estimate { partials, first: first.1, stated_mm }
+    }
+
+    fn autocorrelation(&self, estimate: &Estimate) -> Autocorrelation {
+        let mut partials = estimate.partials.clone();
+        let mut sum_u = 0.0;
         if let Some(first) = partials.first_mut() {
-            *first = posterior.mean;
+            let posterior = self.posterior(&estimate.partials, estimate.stated_mm);
+            *first = posterior.mean();
+            sum_u = posterior.u_of_sum();
         }
-        Autocorrelation {
-            process: self.process(&partials, stated_mm),
-            sum_u: posterior.sum_u,
-            is_as_stated: stated_mm.is_some(),
-            possible: posterior.possible,
+        let process = self.process(&partials, estimate.stated_mm);
+        Autocorrelation { process, sum_u, is_as_stated: estimate.stated_mm.is_some() }
+    }
+
+    /// Equally probable processes.
+    fn possible_processes(&self, estimate: &Estimate) -> Vec<Process> {
+        let mode = if estimate.partials.is_empty() { &[estimate.first][..] } else { &estimate.partials };
+        let posterior = self.posterior(mode, estimate.stated_mm);
+        let mut possible = Vec::with_capacity(POSSIBLE);
+        let mut cumulative = 0.0;
+        for (partials, weight) in posterior.partials.iter().zip(&posterior.weights) {
+            cumulative += weight;
+            while (possible.len() as f64 + 0.5) < cumulative * POSSIBLE as f64 {
+                possible.push(self.process(partials, estimate.stated_mm));
+            }
         }
+        possible
     }
 
     /// The partial autocorrelation of order `k + 1` with the greatest likelihood beside the others, and −2 ln L.
@@ -225,8 +257,8 @@ impl DetrendedRuns {
         (-negative, partial)
     }
 
-    /// The posterior of the first partial autocorrelation about its mode, beside the others.
-    fn posterior(&self, mode: Vec<f64>, stated_mm: Option<f64>) -> Posterior {
+    /// The posterior of the first partial autocorrelation about the mode, beside the others.
+    fn posterior(&self, mode: &[f64], stated_mm: Option<f64>) -> Posterior {
         let with_first = |first: f64| [&[first], &mode[1..]].concat();
         let value = |first: f64| self.fit(&with_first(first), stated_mm).minus_two_ln;
         let least = value(mode[0]);
@@ -248,22 +280,7 @@ impl DetrendedRuns {
         let mut weights: Vec<f64> = places.iter().map(|first| (-0.5 * (value(*first) - least)).exp()).collect();
         let total: f64 = weights.iter().sum();
         weights.iter_mut().for_each(|weight| *weight /= total);
-        let mean_of = |of: &dyn Fn(f64) -> f64| -> f64 { places.iter().zip(&weights).map(|(p, w)| w * of(*p)).sum() };
-        let sum = |first: f64| Predictions::of(&with_first(first)).coefficients().iter().sum::<f64>();
-        let mean_sum = mean_of(&sum);
-        let mut cumulative = 0.0;
-        let mut possible = Vec::with_capacity(POSSIBLE);
-        for (first, weight) in places.iter().zip(&weights) {
-            cumulative += weight;
-            while (possible.len() as f64 + 0.5) < cumulative * POSSIBLE as f64 {
-                possible.push(self.process(&with_first(*first), stated_mm));
-            }
-        }
-        Posterior {
-            mean: mean_of(&|first| first),
-            sum_u: mean_of(&|first| (sum(first) - mean_sum).powi(2)).sqrt(),
-            possible,
-        }
+        Posterior { partials: places.into_iter().map(with_first).collect(), weights }
     }
 
     /// The process with these partial autocorrelations.
@@ -291,12 +308,40 @@ impl DetrendedRuns {
     }
 }
 
-/// The posterior of the first partial autocorrelation.
+/// What the likelihood shows.
+struct Estimate {
+    /// The partial autocorrelations up to the last significant order.
+    partials: Vec<f64>,
+    /// The first partial autocorrelation without others.
+    first: f64,
+    /// The stated standard deviation, mm, if the repeats do not contradict it.
+    stated_mm: Option<f64>,
+}
+
+/// The posterior of the first partial autocorrelation, at places of equal distance.
 struct Posterior {
-    mean: f64,
+    /// The partial autocorrelations at each place.
+    partials: Vec<Vec<f64>>,
+    /// The probability of each place.
+    weights: Vec<f64>,
+}
+
+impl Posterior {
+    fn mean_of(&self, of: impl Fn(&[f64]) -> f64) -> f64 {
+        self.partials.iter().zip(&self.weights).map(|(partials, weight)| weight * of(partials)).sum()
+    }
+
+    /// The mean of the first partial autocorrelation.
+    fn mean(&self) -> f64 {
+        self.mean_of(|partials| partials[0])
+    }
+
     /// Standard deviation of the sum of the coefficients.
-    sum_u: f64,
-    possible: Vec<Process>,
+    fn u_of_sum(&self) -> f64 {
+        let sum = |partials: &[f64]| Predictions::of(partials).coefficients().iter().sum::<f64>();
+        let mean = self.mean_of(sum);
+        self.mean_of(|partials| (sum(partials) - mean).powi(2)).sqrt()
+    }
 }
 
 struct RestrictedFit {
@@ -491,6 +536,12 @@ mod tests {
         assert_eq!(fitted.sigma_mm, 0.7);
     }
 
+    impl DetrendedRuns {
+        fn recovered(&self, stated_mm: Option<f64>) -> Autocorrelation {
+            self.autocorrelation(&self.estimate(MAX_ORDER, stated_mm))
+        }
+    }
+
     /// Runs of noise without their trend. Each is independent.
     fn noise(a: [f64; 2], sigma: f64, lengths: &[usize], generator: &mut Pcg64) -> DetrendedRuns {
         let predictions = Predictions::of(&[correlations(a, 2)[1], a[1]]);
@@ -520,7 +571,7 @@ mod tests {
         let mut generator = Pcg64::seed_from_u64(2);
         for a in [[0.8, 0.0], [0.5, 0.0], [1.1, -0.4]] {
             let drawn: Vec<Autocorrelation> =
-                (0..DRAWS).map(|_| noise(a, 1.5, &[100; 8], &mut generator).autocorrelation(MAX_ORDER, None)).collect();
+                (0..DRAWS).map(|_| noise(a, 1.5, &[100; 8], &mut generator).recovered(None)).collect();
             let order = if a[1] == 0.0 { 1 } else { 2 };
             let right = drawn.iter().filter(|drawn| drawn.process.coefficients.len() == order).count();
             assert!(right >= DRAWS - 3, "{a:?}: {right}");
@@ -533,8 +584,23 @@ mod tests {
             assert!((scatter - 1.0).abs() < 4.0 / (2.0 * DRAWS as f64).sqrt(), "{a:?}: {scatter}");
             let sigma = mean(&|drawn| drawn.process.sigma_mm);
             assert!((sigma / 1.5 - 1.0).abs() < 0.05, "{a:?}: {sigma}");
-            assert!(drawn.iter().all(|drawn| drawn.possible.len() == POSSIBLE));
         }
+    }
+
+    /// Possible processes have the mean and the scatter of the posterior.
+    #[test]
+    fn possible_processes_are_those_of_the_posterior() {
+        let mut generator = Pcg64::seed_from_u64(4);
+        let runs = noise([0.8, 0.0], 1.5, &[100; 8], &mut generator);
+        let estimate = runs.estimate(MAX_ORDER, None);
+        let shown = runs.autocorrelation(&estimate);
+        let firsts: Vec<f64> =
+            runs.possible_processes(&estimate).iter().map(|process| process.coefficients[0]).collect();
+        assert_eq!(firsts.len(), POSSIBLE);
+        let mean = firsts.iter().sum::<f64>() / POSSIBLE as f64;
+        let scatter = (firsts.iter().map(|first| (first - mean).powi(2)).sum::<f64>() / POSSIBLE as f64).sqrt();
+        assert!((mean - shown.process.coefficients[0]).abs() < 0.2 * shown.sum_u, "{mean} {shown:?}");
+        assert!((scatter / shown.sum_u - 1.0).abs() < 0.15, "{scatter} {shown:?}");
     }
 
     /// Of white noise 1 % has a significant coefficient, in short runs too. In short runs of autocorrelated noise a stated
@@ -545,7 +611,7 @@ mod tests {
         let mut generator = Pcg64::seed_from_u64(3);
         let mut drawn = |first: f64, stated: Option<f64>| -> Vec<Autocorrelation> {
             let runs = |generator: &mut Pcg64| noise([first, 0.0], 0.3, &[6, 10, 12, 15, 17], generator);
-            (0..DRAWS).map(|_| runs(&mut generator).autocorrelation(MAX_ORDER, stated)).collect()
+            (0..DRAWS).map(|_| runs(&mut generator).recovered(stated)).collect()
         };
         let significant = |of: &[Autocorrelation]| of.iter().filter(|of| !of.process.coefficients.is_empty()).count();
         let white = drawn(0.0, None);
