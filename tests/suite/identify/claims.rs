@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use abbe::files::{self, ReadOptions};
+use abbe::identify::fit::{prepare, report};
 use abbe::identify::results::{EffectName, TraceResult, TraceVerdict};
 use abbe::model::session::Session;
 use abbe::trace::{TraceOptions, trace};
@@ -66,6 +67,29 @@ fn a_constant_in_noise_does_not_exceed_the_null_distribution() {
     let result = traced(&session_of(&Recipe::new(Kind::LinearCircles, 7316)), TraceOptions::default().significance);
     assert_eq!(result.verdict, TraceVerdict::Clean);
     assert!(result.rejected_candidates.is_empty(), "{:?}", result.rejected_candidates);
+}
+
+/// A fit and a trace use one noise, with the autocorrelation that repeats show: without an effect both give one answer. White
+/// noise would have a third of the uncertainty where the set-up does not determine an error.
+#[test]
+fn a_fit_and_a_trace_of_autocorrelated_noise_give_one_answer() {
+    let noise = Noise::Serial { sigma_um: 0.3, coefficient: 0.8 };
+    for (readings, states_noise) in [(120, true), (400, false), (1500, true)] {
+        let recipe = Recipe { states_noise, ..Recipe::new(Kind::TiltedTable, 7009).noise(noise).readings(readings) };
+        let session = session_of(&recipe);
+        let (problem, fitted) = prepare(&session, 1).unwrap();
+        let of_fit = report(&problem, &fitted).unwrap();
+        let of_trace = traced(&session, TraceOptions::default().significance);
+        let what = format!("{readings} readings");
+        assert_eq!(of_trace.verdict, TraceVerdict::Clean, "{what}");
+        assert_eq!(of_fit.noise_ar_coefficients.len(), 1, "{what}: {:?}", of_fit.noise_ar_coefficients);
+        assert!((of_fit.noise_ar_coefficients[0] - 0.8).abs() < 0.2, "{what}: {:?}", of_fit.noise_ar_coefficients);
+        assert_eq!(of_fit.noise_ar_coefficients, of_trace.noise_ar_coefficients, "{what}");
+        assert_eq!(of_fit.outcome.goodness, of_trace.outcome.goodness, "{what}");
+        for (of_fit, of_trace) in of_fit.parameters.iter().zip(&of_trace.after.parameters) {
+            assert_eq!((&of_fit.id, of_fit.value, of_fit.u), (&of_trace.id, of_trace.value, of_trace.u), "{what}");
+        }
+    }
 }
 
 /// A squareness that warms up within half of the first of two runs, in noise of 0.3 µm with an autocorrelation of 0.8. The
