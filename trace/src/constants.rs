@@ -93,6 +93,8 @@ pub struct Effort {
     pub line_search: usize,
     /// Maximum number of candidates that are tuned at a time.
     pub tuned: usize,
+    /// Maximum number of candidates with one identifier from which it is tuned.
+    pub starts: usize,
     /// Candidates tried together with an effect that is tuned again.
     pub tried: usize,
     /// Candidates tried as the first of a pair in place of two effects.
@@ -102,6 +104,7 @@ pub struct Effort {
 }
 
 /// Effort of the branch on all readings.
-pub const ON_ALL: Effort = Effort { line_search: 12, tuned: 10, tried: 6, first_of_two: 32, first_of_one: 8 };
+pub const ON_ALL: Effort =
+    Effort { line_search: 12, tuned: 10, starts: 3, tried: 6, first_of_two: 32, first_of_one: 8 };
 /// Effort of a branch without one fold. It only predicts that fold, and needs no best name.
-pub const ON_FOLDS: Effort = Effort { line_search: 6, tuned: 2, tried: 2, first_of_two: 8, first_of_one: 8 };
+pub const ON_FOLDS: Effort = Effort { line_search: 6, tuned: 2, starts: 2, tried: 2, first_of_two: 8, first_of_one: 8 };

@@ -35,6 +35,25 @@ impl Tuned {
     }
 }
 
+/// Relative difference of numbers that is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// Groups of candidates with their values, each group and all groups the best first: at most `most` groups that have a value
+/// of at least `least`.
+fn best_first(groups: impl Iterator<Item = Vec<(usize, f64)>>, least: f64, most: usize) -> Vec<Vec<(usize, f64)>> {
+    let order = |a: &(usize, f64), b: &(usize, f64)| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0));
+    let mut groups: Vec<Vec<(usize, f64)>> = groups
+        .map(|mut members| {
+            members.sort_by(order);
+            members
+        })
+        .filter(|members| members[0].1 >= least)
+        .collect();
+    groups.sort_by(|a, b| order(&a[0], &b[0]));
+    groups.truncate(most);
+    groups
+}
+
 impl SearchState<'_> {
     /// Adds to the candidates those near the best, with their shape numbers tuned beside some candidates on some folds,
     /// and the step tables near the best. Returns the gains of the candidates that were present before.
@@ -56,7 +75,7 @@ impl SearchState<'_> {
     fn tuned_near_best(&self, model: &TrainedModel<'_>, gains: &[Gain]) -> Result<Vec<Tuned>, IdentifyError> {
         let variance = self.variance(model);
         let most = self.effort(&model.folds).tuned;
-        let mut nearest: HashMap<String, (usize, f64)> = HashMap::new();
+        let mut nearest: HashMap<String, Vec<(usize, f64)>> = HashMap::new();
         let mut best = 0.0_f64;
         for (candidate, gain) in gains.iter().enumerate() {
             if gain.freedom == 0 || !self.may_be_added(candidate, &model.folds) {
@@ -67,21 +86,13 @@ impl SearchState<'_> {
             }
             let evidence = self.evidence(gain, variance);
             best = best.max(evidence);
-            if self.candidates[candidate].brackets().is_empty() {
-                continue;
-            }
-            let best_of_id = nearest.entry(self.effect(candidate).id()).or_insert((candidate, evidence));
-            if evidence > best_of_id.1 {
-                *best_of_id = (candidate, evidence);
+            if !self.candidates[candidate].brackets().is_empty() {
+                nearest.entry(self.effect(candidate).id()).or_default().push((candidate, evidence));
             }
         }
-        let mut near: Vec<(usize, f64)> =
-            nearest.into_values().filter(|(_, evidence)| *evidence >= MIN_EVIDENCE_SHARE * best).collect();
-        near.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        near.truncate(most);
+        let near = best_first(nearest.into_values(), MIN_EVIDENCE_SHARE * best, most);
         let tuning = model.tuning();
-        let tuned = |k: usize| Some(self.with_best_numbers(&tuning, model, near[k].0, gains[near[k].0].gain)?.0);
-        let mut fresh: Vec<Tuned> = parallel::map(near.len(), &tuned).into_iter().flatten().collect();
+        let mut fresh = self.with_best_numbers_of_each(&tuning, model, &near, gains);
         fresh.extend(self.step_tables_near_best(&tuning, model, best, most)?);
         fresh.retain(|tuned| {
             let present = |c: usize| *self.effect(c) == tuned.effect && self.may_be_used(c, &model.folds);
@@ -166,23 +177,72 @@ impl SearchState<'_> {
     fn tuned_in_place_of(&self, k: usize) -> Result<Vec<Tuned>, IdentifyError> {
         let model = self.model_without(Some(k))?;
         let least = MIN_SHARE_ON_GRID * model.gain(self.selected()[k].candidate)?.gain;
-        let mut best: HashMap<String, (usize, f64)> = HashMap::new();
-        for (candidate, gain) in self.gains(&model)?.iter().enumerate() {
+        let gains = self.gains(&model)?;
+        let mut tunable: HashMap<String, Vec<(usize, f64)>> = HashMap::new();
+        for (candidate, gain) in gains.iter().enumerate() {
             let is_tunable = !self.candidates[candidate].brackets().is_empty();
             if is_tunable && gain.gain >= least && self.may_be_added(candidate, &model.folds) {
-                let of_id = best.entry(self.effect(candidate).id()).or_insert((candidate, gain.gain));
-                if gain.gain > of_id.1 {
-                    *of_id = (candidate, gain.gain);
-                }
+                tunable.entry(self.effect(candidate).id()).or_default().push((candidate, gain.gain));
             }
         }
-        let mut near: Vec<(usize, f64)> = best.into_values().collect();
-        near.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        near.truncate(MAX_TUNED_ALIASES);
-        let tuning = model.tuning();
-        let tuned = |i: usize| Some(self.with_best_numbers(&tuning, &model, near[i].0, near[i].1)?.0);
-        let fresh = parallel::map(near.len(), &tuned).into_iter().flatten();
+        let near = best_first(tunable.into_values(), least, MAX_TUNED_ALIASES);
+        let fresh = self.with_best_numbers_of_each(&model.tuning(), &model, &near, &gains).into_iter();
         Ok(fresh.filter(|tuned| !self.candidates.iter().any(|present| present.effect == tuned.effect)).collect())
+    }
+
+    /// The effect with the largest gain of each group of candidates with one identifier, the best first, with its numbers
+    /// tuned: from the best on the grid, and from those that are no neighbours of a better one. The gain of a wave over few
+    /// periods has several maxima, and between two points of the grid the highest of them loses up to half.
+    fn with_best_numbers_of_each(
+        &self,
+        tuning: &Tuning<'_>,
+        model: &TrainedModel<'_>,
+        groups: &[Vec<(usize, f64)>],
+        gains: &[Gain],
+    ) -> Vec<Tuned> {
+        let most = self.effort(&model.folds).starts;
+        let starts: Vec<(usize, usize)> = groups
+            .iter()
+            .enumerate()
+            .flat_map(|(group, members)| self.starts(members, most).into_iter().map(move |start| (group, start)))
+            .collect();
+        let tuned = |k: usize| {
+            let (group, start) = starts[k];
+            let (tuned, gain) = self.with_best_numbers(tuning, model, start, gains[start].gain)?;
+            let on_grid = gains[groups[group][0].0].gain;
+            (gain > on_grid).then_some((group, tuned, gain))
+        };
+        let mut of_group: Vec<Option<(Tuned, f64)>> = groups.iter().map(|_| None).collect();
+        for (group, tuned, gain) in parallel::map(starts.len(), &tuned).into_iter().flatten() {
+            if of_group[group].as_ref().is_none_or(|(_, best)| gain > *best) {
+                of_group[group] = Some((tuned, gain));
+            }
+        }
+        of_group.into_iter().flatten().map(|(tuned, _)| tuned).collect()
+    }
+
+    /// The candidates of one identifier from which its numbers are tuned, at most `most`. The members come best first, each
+    /// with its gain or evidence.
+    fn starts(&self, members: &[(usize, f64)], most: usize) -> Vec<usize> {
+        let is_neighbour = |candidate: usize, better: usize| {
+            let shape = &self.effect(candidate).shape;
+            let brackets = self.candidates[better].brackets();
+            let within = |(which, [low, high]): (usize, &[f64; 2])| {
+                let slack = ROUNDING * (high - low);
+                (low - slack..=high + slack).contains(&shape.number(which))
+            };
+            brackets.iter().enumerate().all(within)
+        };
+        let mut starts: Vec<usize> = Vec::new();
+        for (candidate, value) in members {
+            if starts.len() == most || *value < MIN_SHARE_ON_GRID * members[0].1 {
+                break;
+            }
+            if !starts.iter().any(|better| is_neighbour(*candidate, *better)) {
+                starts.push(*candidate);
+            }
+        }
+        starts
     }
 
     /// Tunes the shape numbers of an effect for the largest gain. Returns it with its gain; `None` if the gain does not
