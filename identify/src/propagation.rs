@@ -54,7 +54,8 @@ pub fn add_monte_carlo(
              Monte Carlo",
         ));
     }
-    // The draws are those of the noise. What uncertainties cover beside it, aliases and positions of steps, is added.
+    // The draws are those of the noise, with a linear model. What uncertainties cover beside it, aliases, positions of steps and
+    // numbers of shapes, is added.
     let of_noise = fit::parameters_of_noise(problem, fit);
     let is_drawn = |parameter: &ParameterResult| !problem.parameters.is_position(&parameter.id);
     let parameters: Vec<DrawnParameter> = of_noise

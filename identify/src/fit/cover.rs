@@ -1,10 +1,11 @@
-//! What uncertainties cover beside the noise: the aliases of effects, the estimated positions of steps, and a further step.
+//! What uncertainties cover beside the noise: the aliases of effects, the estimated positions of steps, a further step, and
+//! numbers of shapes in which χ² is not parabolic.
 //!
 //! For each effect they cover the largest change `δ` by one of its aliases; for each step the positions `p` in which it, or a
-//! further one, may lie, by their weights:
+//! further one, may lie, by their weights; for each number the ends `p` of its profile interval ([`super::numbers`]):
 //!
 //! ```text
-//! u² = u₀² + Σ_effects max_aliases δ² + Σ_steps Σ_p w(p) δ(p)²
+//! u² = u₀² + Σ_effects max_aliases δ² + Σ_steps, numbers Σ_p w(p) δ(p)²
 //! ```
 //!
 //! The covariance has the changes of one alias correlated: `D·(Σ δδᵀ)·D` for each effect, with `D` such that the
@@ -33,16 +34,19 @@ fn shifts(fit: &Fit, values: &impl Fn(&[f64]) -> Vec<f64>) -> Vec<Vec<Vec<f64>>>
     fit.aliases.iter().map(|effect| effect.aliases.iter().map(of_alias).collect()).collect()
 }
 
-/// The changes of some functions of the parameters by each other position of a step and by a further step, with its weight.
-fn shifts_of_positions(fit: &Fit, values: &impl Fn(&[f64]) -> Vec<f64>) -> impl Iterator<Item = (f64, Vec<f64>)> {
-    let others = fit.positions.iter().flat_map(|position| &position.others);
-    others.chain(&fit.further_steps).map(|(weight, changes)| (*weight, shift(fit, changes, values)))
+/// The changes of some functions of the parameters by each other position of a step, by a further step and by each end of a
+/// profile interval, with its weight.
+fn shifts_of_numbers(fit: &Fit, values: &impl Fn(&[f64]) -> Vec<f64>) -> impl Iterator<Item = (f64, Vec<f64>)> {
+    let positions = fit.positions.iter().flat_map(|position| &position.others);
+    let ends = fit.intervals.iter().flat_map(|interval| &interval.covered).filter(|(weight, _)| *weight > 0.0);
+    let weighted = positions.chain(&fit.further_steps).chain(ends);
+    weighted.map(|(weight, changes)| (*weight, shift(fit, changes, values)))
 }
 
-/// The variance of some functions of the parameters by the positions of steps.
-fn variances_of_positions(fit: &Fit, count: usize, values: &impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
+/// The variance of some functions of the parameters by the positions of steps and the numbers of shapes.
+fn variances_of_numbers(fit: &Fit, count: usize, values: &impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
     let mut variances = vec![0.0; count];
-    for (weight, shift) in shifts_of_positions(fit, values) {
+    for (weight, shift) in shifts_of_numbers(fit, values) {
         variances.iter_mut().zip(shift).for_each(|(sum, shift)| *sum += weight * shift * shift);
     }
     variances
@@ -54,20 +58,20 @@ fn largest(shifts: &[Vec<f64>], count: usize) -> Vec<f64> {
     (0..count).map(most).collect()
 }
 
-/// The contribution of aliases and positions of steps to the uncertainties of functions of the parameters, beside the
+/// The contribution of aliases, positions of steps and numbers of shapes to the uncertainties of functions of the parameters, beside the
 /// noise.
 pub fn contribution(fit: &Fit, count: usize, values: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
-    let mut squares = variances_of_positions(fit, count, &values);
+    let mut squares = variances_of_numbers(fit, count, &values);
     for of_effect in shifts(fit, &values) {
         squares.iter_mut().zip(largest(&of_effect, count)).for_each(|(sum, most)| *sum += most * most);
     }
     squares.into_iter().map(f64::sqrt).collect()
 }
 
-/// Adds aliases and positions of steps to a covariance of functions of the parameters.
+/// Adds aliases, positions of steps and numbers of shapes to a covariance of functions of the parameters.
 pub(crate) fn add_to_covariance(covariance: &mut Mat<f64>, fit: &Fit, values: impl Fn(&[f64]) -> Vec<f64>) {
     let count = covariance.nrows();
-    for (weight, shift) in shifts_of_positions(fit, &values) {
+    for (weight, shift) in shifts_of_numbers(fit, &values) {
         for i in 0..count {
             for j in 0..count {
                 covariance[(i, j)] += weight * shift[i] * shift[j];
@@ -93,10 +97,10 @@ pub(crate) fn add_to_covariance(covariance: &mut Mat<f64>, fit: &Fit, values: im
     }
 }
 
-/// Enlarges the uncertainties of reported parameters to cover positions of steps and aliases, and states which alias
+/// Enlarges the uncertainties of reported parameters to cover positions of steps, numbers of shapes and aliases, and states which alias
 /// enlarges which.
 pub(super) fn cover(parameters: &mut [ParameterResult], problem: &Problem, fit: &Fit) {
-    if fit.aliases.is_empty() && fit.positions.is_empty() {
+    if fit.aliases.is_empty() && fit.positions.is_empty() && fit.intervals.is_empty() {
         return;
     }
     let quantities = quantities(problem, fit);
@@ -106,9 +110,9 @@ pub(super) fn cover(parameters: &mut [ParameterResult], problem: &Problem, fit: 
         values
     };
     let by_effect = shifts(fit, &values);
-    let of_positions = variances_of_positions(fit, parameters.len(), &values);
+    let of_numbers = variances_of_numbers(fit, parameters.len(), &values);
     for (k, parameter) in parameters.iter_mut().enumerate() {
-        let without = (parameter.u * parameter.u + of_positions[k]).sqrt();
+        let without = (parameter.u * parameter.u + of_numbers[k]).sqrt();
         let mut variance = without * without;
         for (of_effect, aliases) in by_effect.iter().zip(&fit.aliases) {
             let most = of_effect.iter().enumerate().max_by(|a, b| a.1[k].abs().total_cmp(&b.1[k].abs()));
@@ -138,7 +142,7 @@ pub(super) fn cover(parameters: &mut [ParameterResult], problem: &Problem, fit: 
 
 impl Fit {
     /// Covariance of the parameters with everything that their uncertainties cover: noise, its enlargement, positions of
-    /// steps, aliases.
+    /// steps, numbers of shapes, aliases.
     pub fn whole_covariance(&self) -> Mat<f64> {
         let mut covariance = &self.covariance * faer::Scale(self.u_enlargement * self.u_enlargement);
         add_to_covariance(&mut covariance, self, <[f64]>::to_vec);

@@ -16,6 +16,12 @@
 //!
 //! Where χ² is not parabolic in a number within two standard uncertainties, the interval of the profile likelihood is
 //! stated: the values at which χ², minimised over all other parameters, rises by the 95 % quantile of one degree of freedom.
+//! If it is longer than that of the covariance, uncertainties cover it: with the changes `δ` of the parameters to its ends,
+//! the number at each end itself, and with the half length `h`
+//!
+//! ```text
+//! u² = u₀² + w Σ_ends δ²,    so that u = h/1.96 for the number
+//! ```
 
 use abbe_model::session::Prior;
 
@@ -54,6 +60,8 @@ pub struct NumberInterval {
     /// The ends of the 95 % interval, as changes of the number, internal units. An end at which the search for it ended may
     /// lie further out.
     pub ends: [f64; 2],
+    /// The changes of all parameters to the ends, internal units, and the weight with which uncertainties cover their squares.
+    pub covered: [(f64, Vec<f64>); 2],
 }
 
 /// As [`fit`], with the estimated numbers and positions of shapes moved to their best values in the problem.
@@ -181,8 +189,12 @@ pub(crate) fn intervals(problem: &Problem, fit: &Fit) -> Result<Vec<NumberInterv
             is_parabolic &= rise.is_some_and(|rise| (PARABOLIC[0]..=PARABOLIC[1]).contains(&rise));
         }
         if !is_parabolic {
-            let ends = [profile.end(-u)?, profile.end(u)?];
-            found.push(NumberInterval { parameter, ends });
+            let [low, high] = [profile.end(-u)?, profile.end(u)?];
+            let half = 0.5 * (high.change - low.change);
+            let lacking = half * half / QUANTILE_95 - (u * fit.u_enlargement).powi(2);
+            let weight = lacking.max(0.0) / (low.change.powi(2) + high.change.powi(2));
+            let ends = [low.change, high.change];
+            found.push(NumberInterval { parameter, ends, covered: [low, high].map(|end| (weight, end.of_all)) });
         }
     }
     Ok(found)
@@ -197,9 +209,24 @@ struct Profile<'p> {
     least: f64,
 }
 
+/// A point of a profile.
+struct Moved {
+    /// The change of the number.
+    change: f64,
+    /// The rise of χ².
+    rise: f64,
+    /// The changes of all parameters.
+    of_all: Vec<f64>,
+}
+
 impl Profile<'_> {
     /// The rise of χ² where the number has changed by this much; `None` if the shape cannot have this number.
     fn rise(&self, change: f64) -> Result<Option<f64>, IdentifyError> {
+        Ok(self.moved(change)?.map(|moved| moved.rise))
+    }
+
+    /// The point where the number has changed by this much; `None` if the shape cannot have this number.
+    fn moved(&self, change: f64) -> Result<Option<Moved>, IdentifyError> {
         let mut held = self.problem.clone();
         let parameter = &mut held.parameters.list[self.parameter];
         parameter.prior = Prior::Gaussian(HELD * parameter.size);
@@ -210,24 +237,27 @@ impl Profile<'_> {
         }
         held.linearise_numbers(&mut at)?;
         settle(&mut held, &mut at)?;
-        Ok(Some((held.sum_of_squares(&at) - self.least).max(0.0)))
+        let rise = (held.sum_of_squares(&at) - self.least).max(0.0);
+        let of_all = |j| held.parameters.value(j, &at) - self.problem.parameters.value(j, &self.fit.beta);
+        Ok(Some(Moved { change, rise, of_all: (0..at.len()).map(of_all).collect() }))
     }
 
-    /// The change at which χ² has risen by the quantile, on the side of `step`. A residual beyond the noise widens the
+    /// The point at which χ² has risen by the quantile, on the side of `step`. A residual beyond the noise widens the
     /// interval as it enlarges uncertainties.
-    fn end(&self, step: f64) -> Result<f64, IdentifyError> {
+    fn end(&self, step: f64) -> Result<Moved, IdentifyError> {
         let wanted = QUANTILE_95 * self.fit.u_enlargement.powi(2);
-        let (mut inside, mut outside) = (0.0, None);
-        let mut next = 1.96 * step * self.fit.u_enlargement;
+        let mut inside = Moved { change: 0.0, rise: 0.0, of_all: vec![0.0; self.fit.beta.len()] };
+        let mut outside = None;
+        let mut next = QUANTILE_95.sqrt() * step * self.fit.u_enlargement;
         for _ in 0..MAX_STEPS {
-            match self.rise(next)? {
-                Some(rise) if (rise / wanted - 1.0).abs() < END_TOLERANCE => return Ok(next),
-                Some(rise) if rise < wanted => inside = next,
+            match self.moved(next)? {
+                Some(moved) if (moved.rise / wanted - 1.0).abs() < END_TOLERANCE => return Ok(moved),
+                Some(moved) if moved.rise < wanted => inside = moved,
                 _ => outside = Some(next),
             }
             next = match outside {
-                Some(outside) => 0.5 * (inside + outside),
-                None => 1.6 * inside,
+                Some(outside) => 0.5 * (inside.change + outside),
+                None => 1.6 * inside.change,
             };
         }
         Ok(inside)
@@ -246,7 +276,7 @@ mod tests {
     use nalgebra::DMatrix;
 
     use super::*;
-    use crate::fit::prepare;
+    use crate::fit::{covariance_of_parameters, parameters, prepare};
 
     /// A bump of 5 µm of EZC at 120° with a half width of 30°, and the numbers from which its estimation starts.
     const TRUE_NUMBERS: [f64; 2] = [2.1, 0.5];
@@ -350,7 +380,7 @@ mod tests {
         let u = fit.covariance[(parameter, parameter)].sqrt();
         let profile = Profile { problem: &problem, fit: &fit, parameter, least: problem.sum_of_squares(&fit.beta) };
         for step in [-u, u] {
-            let end = profile.end(step).unwrap();
+            let end = profile.end(step).unwrap().change;
             let rise = profile.rise(end).unwrap().unwrap();
             assert!((rise / QUANTILE_95 - 1.0).abs() < 2.0 * END_TOLERANCE, "{rise} at {end}");
         }
@@ -370,5 +400,34 @@ mod tests {
         assert!((narrower / wider - 1.0).abs() > 0.05, "{narrower} {wider}");
         let near = profile.rise(0.05 * u).unwrap().unwrap();
         assert!((near / 0.0025 - 1.0).abs() < 0.1, "parabolic near the minimum: {near}");
+    }
+
+    /// The standard uncertainty of a number whose interval is longer than that of a parabola is the half length over 1.96. The
+    /// covariance has its square, and an error that depends on the number has a larger uncertainty too.
+    #[test]
+    fn uncertainties_cover_a_profile_interval() {
+        let [_, mut problem] = problems();
+        problem.noise.sigma_mm *= 50.0;
+        let mut fit = fit_with_numbers(&mut problem, None).unwrap();
+        let before = parameters(&problem, &fit);
+        fit.intervals = intervals(&problem, &fit).unwrap();
+        let after = parameters(&problem, &fit);
+        let covariance = covariance_of_parameters(&problem, &fit, &after);
+        let mut longer = 0;
+        for (k, parameter) in after.iter().enumerate() {
+            let u = covariance.matrix[k][k].sqrt();
+            assert!((u / parameter.u - 1.0).abs() < 1e-9, "{}: {u} and {}", parameter.id, parameter.u);
+            assert!(parameter.u >= before[k].u, "{}: {} and {}", parameter.id, parameter.u, before[k].u);
+            let Some([low, high]) = parameter.interval_95 else { continue };
+            assert!((low..=high).contains(&parameter.value));
+            let of_interval = 0.5 * (high - low) / 1.959_963_985;
+            if of_interval > before[k].u {
+                longer += 1;
+                // Within the accuracy of the ends; the other number of the shape adds its part.
+                assert!(parameter.u >= of_interval * (1.0 - 1e-6), "{}: {of_interval}", parameter.id);
+            }
+        }
+        let is_larger = |k: &usize| after[*k].interval_95.is_none() && after[*k].u > 1.01 * before[*k].u;
+        assert!(longer > 0 && (0..after.len()).any(|k| is_larger(&k)), "{after:?}");
     }
 }
