@@ -233,6 +233,47 @@ pub fn catalogue(kind: Kind, like: &Injected) -> Vec<Injected> {
     entries
 }
 
+/// All effects that a trace searches in a kind of session, at unit amplitude, with the numbers of shapes on grids on which
+/// little of a gain is lost: periods a quarter of a cycle over the travel apart, local features half a width apart in three
+/// widths, single steps, decays of reversal spikes, time constants.
+pub fn library(kind: Kind) -> Vec<Injected> {
+    let mut entries = catalogue(kind, &Injected::new(Component::Bar, Driver::Nothing, Shape::Constant, 1.0));
+    entries.retain(|entry| !matches!(entry.shape, Shape::Warmup { .. }));
+    let mut add = |component, driver, shape| entries.push(Injected::new(component, driver, shape, 1.0));
+    for axis in kind.moving_axes() {
+        let [low, high] = range(kind, axis);
+        let span = high - low;
+        let mut shapes = Vec::new();
+        let most = (4.0 * span / period(kind, axis)) as usize;
+        let period = |quarters: usize| 4.0 * span / quarters as f64;
+        shapes.extend((4..=most).map(|quarters| Shape::Periodic { period: period(quarters), phase_deg: 0.0 }));
+        for width in [0.03, 0.05, 0.08].map(|share| share * span) {
+            let count = (2.0 * span / width) as usize;
+            let centre = |k: usize| low + span * (k as f64 + 0.5) / count as f64;
+            let profile = Profile::RaisedCosine;
+            shapes.extend((0..count).map(|k| Shape::Local { centre: centre(k), width: 1.8 * width, profile }));
+        }
+        let at = |k: u32| low + span * f64::from(k) / 40.0;
+        shapes.extend((1..40).map(|k| Shape::Steps { at: vec![at(k)], heights: vec![1.0] }));
+        let decays = [Decay::Time(0.4), Decay::Time(0.8), Decay::Way(2.5), Decay::Way(4.0), Decay::Way(6.5)];
+        shapes.extend(decays.map(|decay| Shape::ReversalSpike { decay }));
+        for component in Freedom::ALL.map(|freedom| Component::Motion(freedom, axis)) {
+            shapes.iter().for_each(|shape| add(component, Driver::Axis(axis), shape.clone()));
+        }
+    }
+    for component in thermal_components(kind) {
+        for tau_s in [30.0, 60.0, 120.0, 240.0, 480.0, 960.0] {
+            add(component, Driver::Time, Shape::Warmup { tau_s });
+        }
+        if !matches!(component, Component::Location(..) | Component::Bar) {
+            for after_test in 0..kind.tests(10.0).len() - 1 {
+                add(component, Driver::Time, Shape::Remount { after_test });
+            }
+        }
+    }
+    entries
+}
+
 /// Components that can drift: location errors of the moving axes (and squareness of Y), both balls, the bar.
 pub fn thermal_components(kind: Kind) -> Vec<Component> {
     let mut components = vec![Component::Bar];

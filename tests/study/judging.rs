@@ -4,7 +4,7 @@ use abbe::identify::results::{EffectName, EffectResult, ModelResult, ShapeParame
 
 use super::rates::Pulls;
 use super::sessions::{TracedSession, oracle};
-use crate::plant::{Decay, EffectLabel, Injected, Shape, from_name, named};
+use crate::plant::{Decay, EffectLabel, Injected, Oracle, Shape, from_name, named};
 
 /// The name of a found effect, in the notation of the plant.
 pub fn name_in_plant(name: &EffectName) -> EffectLabel {
@@ -84,12 +84,24 @@ pub fn surplus_aliases(
             if numbers == Numbers::Own && !remounted {
                 share = oracle.explained_share_of(truth, &with_own_numbers(&other, own)).max(share);
             }
-            let behind = oracle.strength_sigma(truth) * (1.0 - share * share).max(0.0).sqrt();
-            (share < 0.95 && behind > sigma).then_some(label)
+            is_apart(&oracle, truth, share, sigma).then_some(label)
         })
         .collect();
     surplus_aliases.dedup();
     surplus_aliases
+}
+
+/// Whether another effect, with its own numbers and with those of the truth, neither belongs to the alias class of the truth
+/// nor lies within `sigma` standard deviations of it.
+pub fn is_surplus(oracle: &Oracle, truth: &Injected, other: &Injected, sigma: f64) -> bool {
+    let with_numbers_of_truth = from_name(&named(other), truth);
+    let shares = with_numbers_of_truth.iter().chain([other]).map(|other| oracle.explained_share(truth, other));
+    is_apart(oracle, truth, shares.fold(0.0, f64::max), sigma)
+}
+
+/// The same for an effect that explains this share of the truth.
+fn is_apart(oracle: &Oracle, truth: &Injected, share: f64, sigma: f64) -> bool {
+    share < 0.95 && oracle.strength_sigma(truth) * (1.0 - share * share).max(0.0).sqrt() > sigma
 }
 
 /// The effects that span an effect with the numbers of a result; steps have free heights.

@@ -26,16 +26,14 @@ fn numbers(effect: &Injected) -> Vec<(&'static str, f64)> {
     }
 }
 
-/// Effects at five times the smallest significant amplitude.
-fn study() -> Vec<TracedSession> {
-    run(0..sessions(), |number| {
-        let (kind, noise) = case(number);
-        let oracle = oracle(kind, noise);
-        let mut random = random(STUDY, number);
-        let mut draws = (0..DRAWS).map(|_| oracle.random_detectable(1.0, &mut random));
-        let effect = draws.find(|effect| !numbers(effect).is_empty());
-        (kind, noise, effect.map(|effect| at_multiple(&oracle, &effect, 5.0)).into_iter().collect())
-    })
+/// The session with an effect that has numbers, at five times the smallest significant amplitude.
+fn with_numbers(number: usize) -> (Kind, Noise, Vec<Injected>) {
+    let (kind, noise) = case(number);
+    let oracle = oracle(kind, noise);
+    let mut random = random(STUDY, number);
+    let mut draws = (0..DRAWS).map(|_| oracle.random_detectable(1.0, &mut random));
+    let effect = draws.find(|effect| !numbers(effect).is_empty());
+    (kind, noise, effect.map(|effect| at_multiple(&oracle, &effect, 5.0)).into_iter().collect())
 }
 
 /// The estimated numbers of a found effect beside their true values.
@@ -54,7 +52,7 @@ fn numbers_of_shapes_have_honest_uncertainties() {
     if skipped("numbers_of_shapes_have_honest_uncertainties") {
         return;
     }
-    let outcomes = study();
+    let outcomes = run(0..sessions(), with_numbers);
     let (mut named, mut of_errors, mut of_numbers) = (Rate::default(), Pulls::default(), Pulls::default());
     // Without an explanation the result states that the uncertainties do not cover the missing effect.
     let mut unexplained = Pulls::default();
@@ -112,6 +110,17 @@ fn numbers_of_shapes_have_honest_uncertainties() {
     };
     assert!(beyond(&of_errors, 4.0).is_consistent_with_at_most(0.01), "{:?}", of_errors.0);
     assert!(beyond(&of_numbers, 4.0).is_consistent_with_at_most(0.03), "{:?}", of_numbers.0);
+}
+
+/// A wave of 13 periods over the travel of a circle, most of whose readings lie near its ends: between two points of the
+/// grid of periods a neighbouring maximum of the gain is higher than the true one.
+#[test]
+fn a_period_is_that_of_the_highest_of_several_maxima() {
+    let [outcome] = &run(116..117, with_numbers)[..] else { return };
+    let truth = &outcome.draw.truth.effects[0];
+    let [effect] = &outcome.result.effects[..] else { panic!("{}", summary(outcome, "-")) };
+    let (_, period, estimate) = estimated(effect, truth).next().expect("a period");
+    assert!(is(&effect.name, truth) && (estimate.value - period).abs() < 3.0 * estimate.u, "{estimate:?}, {period}");
 }
 
 /// The session with steps at five times the smallest significant amplitude.

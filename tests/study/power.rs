@@ -10,28 +10,50 @@ use super::pairs::pair;
 use super::rates::Rate;
 use super::sessions::{TracedSession, case, oracle, random, run, sessions, skipped, verbose};
 use super::single::at_multiple_of_smallest;
-use crate::plant::{Driver, Injected, Scan, Shape};
+use crate::plant::{Detected, Driver, Injected, Scan, Shape};
+
+/// What the detectors made of a session.
+struct Compared {
+    matched: bool,
+    scan: Detected,
+    library: Detected,
+}
 
 /// Prints the power of the trace and of the detectors, and returns their shares.
-fn compare(title: &str, outcomes: &[TracedSession]) -> [f64; 3] {
+fn compare(title: &str, outcomes: &[TracedSession]) -> [f64; 4] {
     let detected = outcomes.par_iter().map(|outcome| {
         let oracle = oracle(outcome.kind, outcome.noise);
-        Scan::of(&oracle, &outcome.draw, &outcome.draw.truth.effects).detect(outcome.number as u64)
+        let scan = Scan::of(&oracle, &outcome.draw, &outcome.draw.truth.effects);
+        let seed = outcome.number as u64;
+        let matched = scan.matches();
+        Compared { matched, scan: scan.detect(seed), library: Scan::of_library(&oracle, &outcome.draw).detect(seed) }
     });
-    let detected: Vec<_> = detected.collect();
-    let [mut own, mut matched, mut scanned, mut more] = [Rate::default(); 4];
-    for (outcome, detected) in outcomes.iter().zip(&detected) {
+    let detected: Vec<Compared> = detected.collect();
+    let by_trace = |outcome: &TracedSession| {
         let truths = &outcome.draw.truth.effects;
-        let named = truths.iter().all(|truth| found(outcome, truth).is_some());
-        own.count(named);
-        matched.count(detected.matched);
-        scanned.count(detected.scanned);
-        more.count(detected.claims > truths.len());
-        if verbose() && named != detected.scanned {
-            println!("{} {:?}: trace {named}, {detected:?}, {truths:?}", outcome.number, outcome.noise);
+        truths.iter().all(|truth| found(outcome, truth).is_some())
+    };
+    let rates = |is_in: &dyn Fn(&[Injected]) -> bool| {
+        let [mut own, mut matched, mut scanned, mut of_library] = [Rate::default(); 4];
+        let of_class = outcomes.iter().zip(&detected).filter(|(outcome, _)| is_in(&outcome.draw.truth.effects));
+        for (outcome, detected) in of_class {
+            own.count(by_trace(outcome));
+            matched.count(detected.matched);
+            scanned.count(detected.scan.named);
+            of_library.count(detected.library.named);
+        }
+        [own, matched, scanned, of_library]
+    };
+    let mut more = Rate::default();
+    for (outcome, Compared { scan, library, .. }) in outcomes.iter().zip(&detected) {
+        let truths = &outcome.draw.truth.effects;
+        more.count(scan.claims > truths.len());
+        if verbose() && by_trace(outcome) != library.named {
+            let named = by_trace(outcome);
+            println!("{} {:?}: trace {named}, {scan:?}, {library:?}, {truths:?}", outcome.number, outcome.noise);
         }
     }
-    // The scan knows the positions and heights of all steps, of which a trace has to choose each.
+    // A scan that knows the heights of steps adds what a search has to find step by step.
     let steps = |effects: &[Injected]| effects.iter().any(|effect| matches!(effect.shape, Shape::Steps { .. }));
     let slow =
         |effects: &[Injected]| effects.iter().any(|effect| matches!(effect.driver, Driver::Time | Driver::Temperature));
@@ -42,25 +64,22 @@ fn compare(title: &str, outcomes: &[TracedSession]) -> [f64; 3] {
     ];
     let mut of_classes = String::new();
     for (class, is_in) in classes {
-        let [mut own, mut scanned] = [Rate::default(); 2];
-        for (outcome, detected) in outcomes.iter().zip(&detected) {
-            let truths = &outcome.draw.truth.effects;
-            if is_in(truths) {
-                own.count(truths.iter().all(|truth| found(outcome, truth).is_some()));
-                scanned.count(detected.scanned);
-            }
-        }
-        let _ = writeln!(of_classes, "| {class}: trace; scan | {own}; {scanned} |");
+        let [own, _, scanned, of_library] = rates(is_in);
+        let _ = writeln!(of_classes, "| {class}: trace; scan; scan of the library | {own}; {scanned}; {of_library} |");
     }
-    let [own_share, matched_share, scanned_share] = [own, matched, scanned].map(Rate::share);
+    let [own, matched, scanned, of_library] = rates(&|_| true);
+    let shares = [own, matched, scanned, of_library].map(Rate::share);
+    let over = |k: usize| shares[0] / shares[k];
     println!(
         "| {title} | |\n|---|---|\n| named by the trace | {own} |\n| significant for a detector that knows the effect | \
-         {matched} |\n| named by a scan that knows noise and numbers | {scanned} |\n| more than the true effects by the \
-         scan | {more} |\n{of_classes}| trace over matched, over scan | {:.3}, {:.3} |",
-        own_share / matched_share,
-        own_share / scanned_share
+         {matched} |\n| named by a scan that knows noise and numbers | {scanned} |\n| named by a scan of the library that \
+         knows the noise | {of_library} |\n| more than the true effects by the scan that knows numbers | {more} |\n\
+         {of_classes}| trace over matched, over scan, over scan of the library | {:.3}, {:.3}, {:.3} |",
+        over(1),
+        over(2),
+        over(3)
     );
-    [own_share, matched_share, scanned_share]
+    shares
 }
 
 #[test]
@@ -73,7 +92,7 @@ fn power_is_a_share_of_that_of_detectors_that_know_more() {
         ("one effect at five times", run(0..sessions(), |number| at_multiple_of_smallest(5.0, number))),
         ("two effects at five times", run(0..sessions(), pair)),
     ] {
-        let [_, matched, scanned] = compare(title, &outcomes);
+        let [_, matched, scanned, _] = compare(title, &outcomes);
         // A detector that knows the effect misses at most what its level costs at 5.6 standard deviations.
         assert!(matched >= 0.97 && matched >= scanned - 0.01, "{title}: {matched}, {scanned}");
     }

@@ -1,9 +1,9 @@
 //! One undeclared effect at 5 and at 2 times the smallest amplitude that is significant for the oracle.
 
-use super::judging::{Numbers, found, is, pulls, summary, surplus_aliases};
+use super::judging::{Numbers, found, is, is_surplus, pulls, summary, surplus_aliases};
 use super::rates::{Pulls, Rate};
 use super::sessions::{TracedSession, at_multiple, case, oracle, random, run, sessions, skipped, verbose};
-use crate::plant::{Injected, Kind, Noise, named};
+use crate::plant::{Injected, Kind, Noise, Scan, named};
 
 /// Kind and noise of a session, and its effect at a multiple of the smallest significant size.
 pub fn at_multiple_of_smallest(factor: f64, number: usize) -> (Kind, Noise, Vec<Injected>) {
@@ -32,6 +32,8 @@ struct Tally {
     surplus: Rate,
     separable: Rate,
     far: Rate,
+    surplus_of_scan: Rate,
+    surplus_of_library: Rate,
     alone: Rate,
     held_out: Vec<f64>,
     before: Pulls,
@@ -59,6 +61,17 @@ fn tally(outcomes: &[TracedSession]) -> Tally {
             tally.surplus.count(!of_truth.is_empty());
             tally.separable.count(!own.is_empty());
             tally.far.count(!surplus(FAR_SIGMA, Numbers::OfTruth).is_empty());
+            let oracle = oracle(outcome.kind, outcome.noise);
+            let known = Scan::of(&oracle, &outcome.draw, std::slice::from_ref(truth));
+            for (scan, rate) in [
+                (known, &mut tally.surplus_of_scan),
+                (Scan::of_library(&oracle, &outcome.draw), &mut tally.surplus_of_library),
+            ] {
+                let entries = scan.named();
+                if entries.iter().any(|entry| named(entry) == named(truth)) {
+                    rate.count(entries.iter().any(|entry| is_surplus(&oracle, truth, entry, 2.0)));
+                }
+            }
             if verbose() && !of_truth.is_empty() {
                 println!("SURPLUS in {:?}: {of_truth:?}, with their own numbers {own:?}", named(truth));
             }
@@ -101,6 +114,11 @@ fn print(factor: f64, tally: &Tally) {
     println!("| alias sets with a surplus member beyond 2 sigma | {} |", tally.surplus);
     println!("| the same, members with their own numbers | {} |", tally.separable);
     println!("| alias sets with a surplus member beyond {FAR_SIGMA} sigma | {} |", tally.far);
+    println!("| the same beyond 2 sigma, of a scan that knows noise and numbers | {} |", tally.surplus_of_scan);
+    println!(
+        "| the same beyond 2 sigma, of a scan of the library that knows the noise | {} |",
+        tally.surplus_of_library
+    );
     println!("| held-out rms within 5 % of the oracle's | {} |", tally.near);
     println!(
         "| held-out rms over the oracle's, median and 95 % | {:.3}, {:.3} |",
