@@ -5,9 +5,7 @@ use abbe::identify::results::{EffectName, EffectResult, ParameterResult};
 
 use super::judging::{found, is, pulls, summary};
 use super::rates::{Pulls, Rate};
-use super::sessions::{
-    NOISES, TracedSession, at_multiple, case, oracle, random, run, sessions, skipped, traced, verbose,
-};
+use super::sessions::{NOISES, at_multiple, case, oracle, random, run, sessions, skipped, traced, verbose};
 use crate::plant::{AxisName, Component, Decay, Driver, Freedom, Injected, Kind, Noise, Profile, Recipe, Shape};
 
 /// The number of this study among those that draw effects.

@@ -81,7 +81,8 @@ pub struct ParameterResult {
     /// Standard uncertainty without aliases, in `unit`, if an alias enlarges it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub u_without_aliases: Option<f64>,
-    /// The 95 % interval of a number of a shape by its profile likelihood, in `unit`, where χ² is not parabolic within 2 `u`.
+    /// The 95 % interval of a number of a shape by its profile likelihood, in `unit`, where χ² is not parabolic. Half of it is
+    /// at most 1.96 `u`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interval_95: Option<[f64; 2]>,
     /// What the parameter is, in words: `C table: inclination of the axis about Y (squareness to X)`.
