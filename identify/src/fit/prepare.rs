@@ -279,10 +279,11 @@ fn nominal_residual_mm(problem: &Problem) -> Result<f64, IdentifyError> {
     Ok((sum_of_squares / count.max(1.0)).sqrt() * problem.noise.sigma_mm)
 }
 
-/// Whether two noises differ by less than the rounds can change.
+/// Whether two noises of one source differ by less than the rounds can change.
 fn is_settled(noise: &Noise, before: &Noise) -> bool {
     let (own, of_before) = (&noise.ar_coefficients, &before.ar_coefficients);
-    (noise.sigma_mm / before.sigma_mm - 1.0).abs() < NOISE_TOLERANCE
+    noise.source == before.source
+        && (noise.sigma_mm / before.sigma_mm - 1.0).abs() < NOISE_TOLERANCE
         && own.len() == of_before.len()
         && own.iter().zip(of_before).all(|(own, of_before)| (own - of_before).abs() < COEFFICIENT_TOLERANCE)
 }

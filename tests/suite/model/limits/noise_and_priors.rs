@@ -15,6 +15,19 @@ fn a_noise_of_zero() {
     }
 }
 
+/// Readings of a nominal machine that repeat to their resolution: the noise of repeats is that of the resolution, 0.1 µm/√12,
+/// with which the fit begins too.
+#[test]
+fn repeats_within_the_resolution() {
+    let case = Case { noise: "resolution_um = 0.1", ..Case::default() };
+    let nominal: String = (case.angles.iter().chain(&case.angles).enumerate())
+        .map(|(row, angle)| format!("{},{angle:?},{:?}\n", 1 + row / case.angles.len(), case.bar_mm))
+        .collect();
+    let result = fitted(&case.session(), &format!("run,c_deg,length_mm\n{nominal}"));
+    assert_eq!(result["noise_source"], "repeats");
+    assert!((result["noise_um"].as_f64().unwrap() - 0.1 / 12.0_f64.sqrt()).abs() < 1e-9, "{}", result["noise_um"]);
+}
+
 #[test]
 fn an_invalid_noise() {
     for (noise, message) in [
