@@ -1,14 +1,14 @@
 //! Estimates the noise model of a trace from repeats: standard deviation and autocorrelation.
 
-use abbe_identify::noise::{Noise, NoiseSource, along_runs};
+use abbe_identify::noise::{Noise, NoiseSource, along_runs, stated_against_repeats};
 use abbe_identify::problem::Problem;
 
 use super::constants::{MIN_AGAINST_STATED, SCATTER};
 
 /// Sets the noise standard deviation and autocorrelation from repeats, if there are enough. The standard deviation of
-/// white noise replaces a stated one if more of them determine it, that of autocorrelated noise only if they contradict the
-/// stated one: little of the slow part is left in their deviations. Returns whether this changed the noise by more than its
-/// sampling scatter.
+/// white noise replaces a stated one if many of them determine it or they contradict the stated one, that of autocorrelated
+/// noise only if they contradict it: little of the slow part is left in their deviations. Returns whether this changed the
+/// noise by more than its sampling scatter.
 pub(crate) fn estimate_noise_model(problem: &mut Problem, residuals: &[Vec<f64>]) -> bool {
     let Some((pure, estimated)) = along_runs(problem, residuals) else {
         return false;
@@ -16,7 +16,11 @@ pub(crate) fn estimate_noise_model(problem: &mut Problem, residuals: &[Vec<f64>]
     let stated_mm = problem.session.stated_noise_mm();
     let white = estimated.process.coefficients.is_empty();
     let (sigma_mm, source) = match (stated_mm, pure.sigma_mm()) {
-        (Some(stated_mm), _) if white && pure.freedom < MIN_AGAINST_STATED => (stated_mm, NoiseSource::Stated),
+        (Some(stated_mm), _)
+            if white && pure.freedom < MIN_AGAINST_STATED && stated_against_repeats(problem, residuals).is_none() =>
+        {
+            (stated_mm, NoiseSource::Stated)
+        }
         (_, Some(sigma_mm)) if white => (sigma_mm, NoiseSource::Repeats),
         _ if white => (problem.noise.sigma_mm, problem.noise.source),
         _ if estimated.is_as_stated => (estimated.process.sigma_mm, NoiseSource::Stated),

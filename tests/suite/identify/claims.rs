@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::{prepare, report};
+use abbe::identify::noise::NoiseSource;
 use abbe::identify::results::{EffectName, TraceResult, TraceVerdict};
 use abbe::model::session::Session;
 use abbe::trace::{TraceOptions, trace};
@@ -89,6 +90,22 @@ fn a_fit_and_a_trace_of_autocorrelated_noise_give_one_answer() {
         for (of_fit, of_trace) in of_fit.parameters.iter().zip(&of_trace.after.parameters) {
             assert_eq!((&of_fit.id, of_fit.value, of_fit.u), (&of_trace.id, of_trace.value, of_trace.u), "{what}");
         }
+    }
+}
+
+/// Of a noise stated a hundred times too large or too small, a trace of a short session keeps that of repeats: with the stated
+/// one, priors outweigh readings, and effects are claimed that are smaller than their u.
+#[test]
+fn a_stated_noise_that_repeats_contradict_gives_no_claim() {
+    let noise = Noise::White { sigma_um: 0.3 };
+    let recipe = Recipe { states_noise: false, ..Recipe::new(Kind::Chapter6, 7134).noise(noise).readings(120) };
+    let mut session = session_of(&recipe);
+    for stated_um in [0.003, 30.0] {
+        session.noise_mm = Some(1e-3 * stated_um);
+        let result = traced(&session, TraceOptions::default().significance);
+        assert!(result.effects.is_empty(), "{stated_um}: {:?}", result.effects);
+        assert_eq!(result.noise_source, NoiseSource::Repeats, "{stated_um}");
+        assert!((result.noise_um / 0.3 - 1.0).abs() < 0.3, "{stated_um}: {}", result.noise_um);
     }
 }
 
