@@ -30,6 +30,9 @@ pub const SCATTER: f64 = 0.02;
 /// Degrees of freedom of repeats from which their standard deviation replaces a stated one. With fewer it is uncertain by
 /// more than 7 %.
 pub const MIN_AGAINST_STATED: usize = 100;
+/// Ratio to a stated standard deviation beyond which that of few repeats replaces it. In short runs slow noise, of which
+/// trends take the most, reduces that of repeats by up to a half.
+pub const FAR_FROM_STATED: f64 = 5.0;
 
 /// Consecutive additions that may fail to lower the held-out error before they are withdrawn. Of two effects that
 /// partly cancel each other, the first alone explains little.
