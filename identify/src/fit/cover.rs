@@ -58,8 +58,8 @@ fn largest(shifts: &[Vec<f64>], count: usize) -> Vec<f64> {
     (0..count).map(most).collect()
 }
 
-/// The contribution of aliases, positions of steps and numbers of shapes to the uncertainties of functions of the parameters, beside the
-/// noise.
+/// The contribution of aliases, positions of steps and numbers of shapes to the uncertainties of functions of the parameters,
+/// beside the noise.
 pub fn contribution(fit: &Fit, count: usize, values: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
     let mut squares = variances_of_numbers(fit, count, &values);
     for of_effect in shifts(fit, &values) {
@@ -97,8 +97,8 @@ pub(crate) fn add_to_covariance(covariance: &mut Mat<f64>, fit: &Fit, values: im
     }
 }
 
-/// Enlarges the uncertainties of reported parameters to cover positions of steps, numbers of shapes and aliases, and states which alias
-/// enlarges which.
+/// Enlarges the uncertainties of reported parameters to cover positions of steps, numbers of shapes and aliases, and states
+/// which alias enlarges which.
 pub(super) fn cover(parameters: &mut [ParameterResult], problem: &Problem, fit: &Fit) {
     if fit.aliases.is_empty() && fit.positions.is_empty() && fit.intervals.is_empty() {
         return;
