@@ -79,14 +79,26 @@ pub enum IdentifyError {
     },
     /// The iterations did not converge.
     #[error(
-        "no convergence after {iterations} iterations (the sum of squares is {sum_of_squares:.3e}); \
-         check that the readings belong to this machine and that the nominal geometry is right"
+        "no convergence after {iterations} iterations (the sum of squares is {sum_of_squares:.3e}){along}; check that the \
+         readings belong to this machine and that the nominal geometry is right"
     )]
     NoConvergence {
         /// The number of iterations.
         iterations: usize,
         /// The last sum of squares.
         sum_of_squares: f64,
+        /// The next step.
+        step: Vec<f64>,
+        /// The parameters along which the iterations still move, in words.
+        along: String,
+    },
+    /// Estimates mean nothing, and a cause is found.
+    #[error("{found}; {diagnosis}")]
+    Implausible {
+        /// What was found.
+        found: String,
+        /// The cause.
+        diagnosis: String,
     },
     /// The readings contradict the session.
     #[error("{found}; {diagnosis}")]

@@ -13,7 +13,7 @@ use crate::numerics::ranking::smallest_first;
 use crate::numerics::solve::Svd;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
-use crate::results::{Combination, DeterminedByPrior, Unobservable};
+use crate::results::{Combination, DeterminedByPrior, Finding, Unobservable};
 
 /// A combination of parameters whose columns are nearly collinear.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -100,25 +100,42 @@ fn format_short(value: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').replace('-', "−")
 }
 
-/// Null-space combinations: they leave every reading unchanged, and no prior determines them.
+/// Combinations that are not identifiable, and that no prior determines: those that leave every reading unchanged, and
+/// weak ones.
 pub fn unidentifiable(problem: &Problem, rank: &Rank) -> Vec<Unobservable> {
     let list = &problem.parameters.list;
-    rank.null_combinations
-        .iter()
-        .zip(&rank.pivots)
-        .map(|(row, pivot)| {
-            let combination = in_display_units(problem, row, *pivot);
-            let why = match combination.as_slice() {
-                [(id, _)] => {
-                    let (quantity, group) = name_of(list, id);
-                    let place = group.map_or(String::new(), |group| format!(" in {group}"));
-                    format!("no reading of these tests changes with {quantity}{place}")
-                }
-                _ => describe(list, &combination, CONFOUNDED),
-            };
-            Unobservable { combination: combination.into_iter().collect(), why }
-        })
-        .collect()
+    let rows = rank.null_combinations.iter().zip(&rank.pivots).zip(&rank.weak_u);
+    rows.map(|((row, pivot), weak_u)| {
+        let combination = in_display_units(problem, row, *pivot);
+        let finding = if weak_u.is_some() { Finding::Weak } else { Finding::Structural };
+        let why = match (weak_u, combination.as_slice()) {
+            (Some(u), _) => {
+                let others: Vec<&str> = combination[1..].iter().map(|(id, _)| id.as_str()).collect();
+                weak(&list[*pivot], &others, *u)
+            }
+            (None, [(id, _)]) => {
+                let (quantity, group) = name_of(list, id);
+                let place = group.map_or(String::new(), |group| format!(" in {group}"));
+                format!("no reading of these tests changes with {quantity}{place}")
+            }
+            (None, _) => describe(list, &combination, CONFOUNDED),
+        };
+        Unobservable { combination: combination.into_iter().collect(), finding, why }
+    })
+    .collect()
+}
+
+/// Describes a weak combination: a parameter, the others that change with it, and the standard uncertainty in physical sizes.
+pub(crate) fn weak(leader: &Parameter, others: &[&str], u: f64) -> String {
+    let u = format_short(u * leader.size * leader.unit.display_per_internal);
+    let together = match others {
+        [] => String::new(),
+        [others @ .., _] if others.len() >= MAX_NAMED => {
+            format!(" together with {} and {} more", others[..MAX_NAMED].join(", "), others.len() + 1 - MAX_NAMED)
+        }
+        _ => format!(" together with {}", others.join(", ")),
+    };
+    format!("{} is weakly determined{together}: u = {u} {}, more than such a machine has", leader.id, leader.unit.name)
 }
 
 /// A row over scaled parameters in display units: the pivot first, with 1, then the others in the order of the
@@ -276,7 +293,7 @@ mod tests {
     fn a_long_combination_names_five_quantities() {
         let parameter = |id: &str, role: Role| {
             let unit = Unit { name: "um".into(), display_per_internal: 1e3 };
-            Parameter { id: id.into(), unit, size: 1.0, prior: Prior::Free, role }
+            Parameter { id: id.into(), unit, size: 1.0, prior: Prior::Free, role, found: 0.0 }
         };
         let ids = ["EX0C", "EY0C", "EX0A", "EY0A", "EZ0A", "EX0B", "EY0B"];
         let list: Vec<Parameter> = ids.iter().map(|id| parameter(id, Role::Error)).collect();

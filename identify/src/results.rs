@@ -32,7 +32,7 @@ pub use outcome::{
 };
 pub(crate) use parameter::{COVERAGE_FACTOR, phases_follow_amplitudes};
 pub use parameter::{
-    Combination, Covariance, DeterminedBy, EnlargedBy, Interval, NullSpace, ParameterResult, Unobservable,
+    Combination, Covariance, DeterminedBy, EnlargedBy, Finding, Interval, NullSpace, ParameterResult, Unobservable,
 };
 pub use pointing::{PointingTerm, PointingTerms};
 pub use statements::{

@@ -1,6 +1,6 @@
 //! What the readings leave open: null-space directions, and readings that are excluded.
 
-use abbe::identify::results::{DeterminedByPrior, Outlier, Unobservable};
+use abbe::identify::results::{DeterminedByPrior, Finding, Outlier, Unobservable};
 use abbe::identify::unit::ReadingUnit;
 use abbe::model::words::counted;
 
@@ -11,7 +11,7 @@ use super::table::{Table, cells};
 /// Outliers that a terminal shows without `--all`.
 const MAX_OUTLIERS: usize = 3;
 
-/// One sentence for each combination that leaves every reading unchanged.
+/// One sentence for each combination that is not identifiable.
 pub fn sentences(directions: &[Unobservable]) -> Vec<String> {
     directions.iter().map(|item| with_symbols(&item.why)).collect()
 }
@@ -44,10 +44,21 @@ pub fn section(
         report.brief(Text::Note(errors.join(", ")));
         report.detail(Text::List(by_prior(prior)));
     }
-    if !null_space.is_empty() {
-        let directions = counted(null_space.len(), "null-space direction");
-        let heading = format!("Confounded: {directions} (a combination that leaves every reading unchanged)");
-        report.headed(Level::Key, heading, Text::List(sentences(null_space)));
+    let groups = [
+        (
+            Finding::Structural,
+            "Confounded",
+            "null-space direction",
+            "a combination that leaves every reading unchanged",
+        ),
+        (Finding::Weak, "Weakly determined", "combination", "it changes readings by less than their noise"),
+    ];
+    for (finding, word, noun, meaning) in groups {
+        let found: Vec<Unobservable> = null_space.iter().filter(|one| one.finding == finding).cloned().collect();
+        if !found.is_empty() {
+            let heading = format!("{word}: {} ({meaning})", counted(found.len(), noun));
+            report.headed(Level::Key, heading, Text::List(sentences(&found)));
+        }
     }
     report.key(self::outliers(outliers, unit));
 }

@@ -1,8 +1,8 @@
 //! Estimation of the parameters of a session from its readings.
 //!
-//! The rank is decided on the linearisation at the nominal machine. Gauss–Newton then iterates in the identifiable
-//! directions only. A non-identifiable combination keeps its nominal value and is reported as a combination, never as a
-//! number. The law of propagation gives the uncertainties, `Cov = N (Nᵀ JᵀV⁻¹J N)⁻¹ Nᵀ`. The columns of `N` span the
+//! The rank is decided on the linearisation at the nominal machine, and once more where the fit ends. Gauss–Newton iterates
+//! in the identifiable directions only. A non-identifiable combination keeps its nominal value and is reported as a
+//! combination, never as a number. The law of propagation gives the uncertainties, `Cov = N (Nᵀ JᵀV⁻¹J N)⁻¹ Nᵀ`. The columns of `N` span the
 //! identifiable directions (JCGM 100, 5.2; JCGM 102, 6.2).
 
 mod aliases;
@@ -23,6 +23,7 @@ pub mod tpoint;
 use std::cell::RefCell;
 
 use abbe_model::session::Prior;
+use abbe_model::words::listed;
 use faer::Mat;
 
 use crate::error::IdentifyError;
@@ -32,6 +33,7 @@ use crate::numerics::least_squares::{LeastSquares, Scaling, minimise};
 use crate::numerics::rank::Rank;
 use crate::numerics::tails::{chi_square_tail, residual_tail};
 use crate::numerics::triangle::Triangle;
+use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
 
 pub use aliases::{AliasChange, EffectAliases, at_solution as aliases_at_solution};
@@ -110,6 +112,10 @@ impl LeastSquares for IdentifiableDirections<'_> {
     fn sum_of_squares(&self, z: &[f64]) -> f64 {
         self.problem.sum_of_squares(&self.rank.parameters_at(z))
     }
+
+    fn degrees_of_freedom(&self) -> f64 {
+        freedom(self.problem, self.rank) as f64
+    }
 }
 
 /// Fits a problem, starting from the nominal machine or from given parameters.
@@ -126,25 +132,79 @@ pub struct Minimum {
     pub beta: Vec<f64>,
     /// The triangular factors of the folds at `beta`.
     pub triangles: Vec<Triangle>,
-    /// The rank at the nominal machine.
+    /// The rank at the nominal machine, or at `beta` where it is larger.
     pub rank: Rank,
 }
 
-/// Minimises the sum of squares in the identifiable directions, from the nominal machine or from given parameters.
+/// Singular value at the solution, in standard deviations per physical size, from which a direction is identifiable that
+/// is none at the nominal machine: its uncertainty is a tenth of the physical size.
+const IDENTIFIED_BY_ERRORS: f64 = 10.0;
+/// Maximum number of ranks at solutions.
+const MAX_RANKS: usize = 3;
+/// Change of an error by such a direction, in physical sizes, from which it is no estimate.
+const FAR: f64 = 10.0;
+/// Step from a linearisation, in physical sizes, at which the readings are linear.
+const LINEAR: f64 = 1e-5;
+
+/// Minimises the sum of squares in the identifiable directions, from the nominal machine or from given parameters. Errors of
+/// the machine may make directions identifiable that the nominal machine hides: the iterations then go on with these.
 ///
 /// # Errors
 /// If the model cannot be evaluated, or the iterations do not converge.
 pub fn minimum(problem: &Problem, start: Option<&[f64]>) -> Result<Minimum, IdentifyError> {
-    let (rank, last) = rank_at_nominal(problem)?;
-    let restricted = IdentifiableDirections { problem, rank: &rank, last: RefCell::new(last) };
+    let (rank, linearised) = rank_at_nominal(problem)?;
+    let mut found = minimum_of_rank(problem, rank, linearised, start)?;
+    let has_families = !families::families(&problem.parameters).is_empty();
+    for _ in 0..MAX_RANKS {
+        let is_full = found.rank.null_space.ncols() == 0;
+        if is_full || has_families {
+            break;
+        }
+        let whole = problem.prior_triangle(&found.beta).merged(&found.triangles);
+        let rank =
+            problem.parameters.rank_above(&whole, (IDENTIFIED_BY_ERRORS, found.rank.identifiable_basis.ncols()))?;
+        if rank.null_space.ncols() >= found.rank.null_space.ncols() {
+            break;
+        }
+        let Ok(further) =
+            minimum_of_rank(problem, rank, (found.beta.clone(), found.triangles.clone()), Some(&found.beta))
+        else {
+            break;
+        };
+        // Far from the machine the readings depend on these directions in another way: what is found there is no estimate.
+        let list = problem.parameters.list.iter();
+        let is_far = |((after, before), parameter): ((&f64, &f64), &Parameter)| {
+            parameter.role != Role::Setup && (after - before).abs() > FAR * parameter.size
+        };
+        let lowered = problem.sum_of_squares(&further.beta) <= problem.sum_of_squares(&found.beta);
+        if !lowered || further.beta.iter().zip(&found.beta).zip(list).any(is_far) {
+            break;
+        }
+        found = further;
+    }
+    Ok(found)
+}
+
+/// The same in the identifiable directions of a rank. `linearised` are parameters and their triangular factors.
+fn minimum_of_rank(
+    problem: &Problem,
+    rank: Rank,
+    linearised: (Vec<f64>, Vec<Triangle>),
+    start: Option<&[f64]>,
+) -> Result<Minimum, IdentifyError> {
+    let count = rank.identifiable_basis.ncols();
+    let restricted = IdentifiableDirections { problem, rank: &rank, last: RefCell::new(linearised) };
+    let sizes = problem.parameters.sizes();
+    let from = start.map_or_else(|| vec![0.0; count], |beta| rank.coordinates(beta, &sizes));
     let mut end = None;
-    if rank.identifiable_basis.ncols() > 0 {
-        let scale = Scaling::Physical(vec![1.0; rank.identifiable_basis.ncols()]);
-        let from = start.map_or_else(
-            || vec![0.0; rank.identifiable_basis.ncols()],
-            |beta| rank.coordinates(beta, &problem.parameters.sizes()),
-        );
-        end = Some(rank.parameters_at(&minimise(&restricted, &from, &scale)?.x));
+    if count > 0 {
+        let scale = Scaling::Physical(vec![1.0; count]);
+        let found = minimise(&restricted, &from, &scale).map_err(|error| named(problem, &rank, error))?;
+        let last = rank.coordinates(&restricted.last.borrow().0, &sizes);
+        if last.iter().zip(&found.x).any(|(last, end)| (end - last).abs() > LINEAR) {
+            restricted.linearise(&found.x)?;
+        }
+        end = Some(rank.parameters_at(&found.x));
     }
     let (last, triangles) = restricted.last.into_inner();
     let beta = end.unwrap_or_else(|| last.clone());
@@ -154,6 +214,36 @@ pub fn minimum(problem: &Problem, start: Option<&[f64]>) -> Result<Minimum, Iden
     Ok(Minimum { beta, triangles, rank })
 }
 
+/// Number of parameters that a message about the iterations names.
+const MAX_NAMED: usize = 3;
+
+/// An error of the iterations with the parameters along which they still move, the largest step against its physical size
+/// first.
+fn named(problem: &Problem, rank: &Rank, error: IdentifyError) -> IdentifyError {
+    let IdentifyError::NoConvergence { iterations, sum_of_squares, step, .. } = error else { return error };
+    let list = &problem.parameters.list;
+    let mut moved: Vec<(f64, &str)> = (rank.parameters_at(&step).iter().zip(list))
+        .map(|(step, parameter)| ((step / parameter.size).abs(), parameter.id.as_str()))
+        .filter(|(share, _)| *share > 0.0)
+        .collect();
+    moved.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let names: Vec<&str> = moved.iter().take(MAX_NAMED).map(|(_, id)| *id).collect();
+    let along = match names[..] {
+        [] => String::new(),
+        _ => format!(
+            "; the iterations still move {}, which these readings hardly determine: state their uncertainties, leave errors \
+             out of `[unknowns]`, or add readings that separate them",
+            listed(&names, "and")
+        ),
+    };
+    IdentifyError::NoConvergence { iterations, sum_of_squares, step, along }
+}
+
+/// Degrees of freedom of χ², at least 1. Each prior counts as an observation.
+fn freedom(problem: &Problem, rank: &Rank) -> usize {
+    (problem.scalars() + problem.prior_rows()).saturating_sub(rank.identifiable_basis.ncols()).max(1)
+}
+
 /// The rank at the nominal machine, and the parameters and triangular factors of its linearisation. The priors of
 /// families determine their coefficients, so the rank is that of the other parameters, and their linearisation is not
 /// computed: there may be hundreds of them.
@@ -161,7 +251,8 @@ fn rank_at_nominal(problem: &Problem) -> Result<(Rank, (Vec<f64>, Vec<Triangle>)
     let decided = |problem: &Problem| {
         let nominal = vec![0.0; problem.parameters.list.len()];
         let triangles = problem.triangles(&nominal)?;
-        let rank = problem.parameters.rank(&problem.prior_triangle(&nominal).merged(&triangles))?;
+        let whole = problem.prior_triangle(&nominal).merged(&triangles);
+        let rank = problem.parameters.rank(&whole)?;
         Ok::<_, IdentifyError>((rank, (nominal, triangles)))
     };
     if families::families(&problem.parameters).is_empty() {
@@ -193,9 +284,7 @@ fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, IdentifyError> {
     // The inflation of the likelihood is no noise: readings count with the noise, priors as they are.
     let (penalised, of_priors) = (whole.sum_of_squares(), problem.prior_triangle(&beta).sum_of_squares());
     let chi_square = penalised + (problem.noise.inflation - 1.0) * (penalised - of_priors);
-    // Each prior counts as an observation in χ².
-    let degrees_of_freedom =
-        (problem.scalars() + problem.prior_rows()).saturating_sub(rank.identifiable_basis.ncols()).max(1);
+    let degrees_of_freedom = freedom(problem, &rank);
     let free = degrees_of_freedom as f64;
     let p_value = residual_tail(chi_square, free, freedom_of_noise(problem, &residuals));
     let birge_ratio = (chi_square / free).sqrt();

@@ -1,8 +1,13 @@
 //! Gauss–Newton iteration with Levenberg–Marquardt damping, on problems in the form of triangular factors.
 //!
 //! In scaled parameters `y = x/d` the step solves `min ‖c − R·D·η‖² + λ‖η‖²` by the singular value decomposition of
-//! `R·D`. `λ` is zero as long as full steps lower the sum of squares. A linear problem therefore takes one step
-//! (Marquardt, J. SIAM 11 (1963) 431; Moré, Lecture Notes in Mathematics 630 (1978) 105).
+//! `R·D`. `λ` is zero as long as full steps lower the sum of squares as predicted. A linear problem therefore takes one
+//! step. Otherwise the gain ratio, the decrease over the predicted one, controls `λ` (Marquardt, J. SIAM 11 (1963) 431;
+//! Madsen, Nielsen, Tingleff, Methods for non-linear least squares problems, 2004, section 3.2).
+//!
+//! The iterations end where the undamped step would lower the sum of squares by a negligible share of its mean over the
+//! degrees of freedom, `‖R·D·η‖² < ε · ‖r‖²/ν`: the parameters are then `√ε` standard uncertainties from the minimum,
+//! whatever noise is assumed.
 //!
 //! Along a direction that the readings hardly determine, the neglected second derivatives may be nearly as large as
 //! `JᵀJ`. Each full step is then `q` times the step before with `q` close to 1, or close to −1 if it goes too far. The sum
@@ -26,6 +31,8 @@ pub trait LeastSquares {
     fn linearise(&self, x: &[f64]) -> Result<Triangle, IdentifyError>;
     /// `‖r(x)‖²`; not finite if the model cannot be evaluated.
     fn sum_of_squares(&self, x: &[f64]) -> f64;
+    /// Degrees of freedom of `‖r‖²`, at least 1.
+    fn degrees_of_freedom(&self) -> f64;
 }
 
 /// The scale of each parameter.
@@ -51,20 +58,23 @@ pub struct LeastSquaresSolution {
 }
 
 const MAX_ITERATIONS: usize = 200;
-const SMALLEST_RELATIVE_STEP: f64 = 1e-12;
+/// Attempts to find a damping with which a step lowers the sum of squares.
+const MAX_ATTEMPTS: usize = 30;
+/// Predicted decrease of the sum of squares, as a share of its mean, at which the iterations end: a millionth of a standard
+/// uncertainty. One more step follows.
+const CONVERGED: f64 = 1e-12;
+/// The same for steps that do not end within [`MAX_ITERATIONS`]: a hundredth of a standard uncertainty.
+const NEGLIGIBLE: f64 = 1e-4;
 /// Decrease of the sum of squares, as a share of it, that is below the rounding of the sum.
 const ROUNDING_OF_SUM: f64 = 1e-12;
-/// Relative step below which the nonlinearity of the model is negligible: its square is below rounding.
-const LINEAR_RELATIVE_STEP: f64 = 1e-7;
-
-/// Predicted decrease of the sum of squares, in units of the variance of a reading, at which steps that do not end within
-/// [`MAX_ITERATIONS`] are close enough to the minimum.
-const NEGLIGIBLE_DECREASE: f64 = 1e-4;
-
-/// Iterations after which steps that shrink slowly are extrapolated.
-const PATIENCE: usize = 10;
-/// Least `|q|` of steps that shrink slowly. With less, some hundred steps reach [`SMALLEST_RELATIVE_STEP`].
-const SLOW: f64 = 0.8;
+/// Full steps of such a decrease go on as long as each predicts at most this share of the one before.
+const SHRINKING: f64 = 0.25;
+/// Relative step that is below the rounding of the readings.
+const ROUNDING_OF_STEP: f64 = 1e-9;
+/// Gain ratio below which the damping grows, and the one above which it falls.
+const POOR_GAIN: f64 = 0.25;
+/// Least `|q|` of steps that shrink slowly.
+const SLOW: f64 = 0.5;
 
 /// Minimises the sum of squares from a start value.
 ///
@@ -83,129 +93,150 @@ pub fn minimise(
         Scaling::Physical(sizes) => sizes.clone(),
         Scaling::Columns => vec![f64::INFINITY; n],
     };
-    let mut damping = 0.0;
-    let mut step_before = 1.0;
-    // The full step before, in scaled parameters.
-    let mut full_before: Option<Vec<f64>> = None;
+    let mut damping = Damping::default();
+    // The full step before, in scaled parameters, and the decrease that it predicted.
+    let mut before: Option<(Vec<f64>, f64)> = None;
     for iteration in 1..=MAX_ITERATIONS {
         let (r, c, _) = triangle.parts();
         if let Scaling::Columns = scaling {
-            for j in 0..n {
-                let norm = (0..n).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt();
-                if norm > 0.0 {
-                    scale[j] = scale[j].min(1.0 / norm);
-                } else if !scale[j].is_finite() {
-                    scale[j] = 1.0;
-                }
-            }
+            largest_norms(&r, &mut scale);
         }
         let scaled = Mat::from_fn(n, n, |i, j| r[(i, j)] * scale[j]);
         let directions = Svd::of(scaled.as_ref())?;
-        let largest = directions.singular_values.first().copied().unwrap_or(0.0);
-        // A step is accepted if the sum of squares falls. Near the minimum the decrease is below rounding and the sizes
-        // of the steps decide.
-        let mut accepted = false;
-        let mut converged = false;
-        let mut next = None;
-        for attempt in 0..60 {
-            let mut step = directions.solve(&c, damping);
-            step.iter_mut().zip(&scale).for_each(|(step, scale)| *step *= scale);
-            let after = |factor: f64| x.iter().zip(&step).map(|(a, b)| a + factor * b).collect::<Vec<f64>>();
-            let mut trial = after(1.0);
-            let relative = step
-                .iter()
-                .zip(&scale)
-                .zip(&x)
-                .map(|((s, d), x)| {
-                    (s / (x.abs() + if let Scaling::Physical(_) = scaling { *d } else { 0.0 }).max(1e-300)).abs()
-                })
-                .fold(0.0, f64::max);
-            // Successive steps shrink by about the same factor. This product estimates the next step.
-            let next_relative = relative * (relative / step_before);
-            if damping == 0.0 && relative < LINEAR_RELATIVE_STEP && next_relative < SMALLEST_RELATIVE_STEP {
-                let triangle = triangle.after(&step);
-                return Ok(LeastSquaresSolution {
-                    x: trial,
-                    sum_of_squares: triangle.sum_of_squares(),
-                    triangle,
-                    iterations: iteration,
-                });
-            }
-            // A direction may be determined so poorly that a step along it changes the sum of squares by less than
-            // rounding, while it is no small step. Successive steps decide then: the minimum is reached when they no
-            // longer shrink by half.
-            let rounded = damping == 0.0 && directions.explained(&c) < ROUNDING_OF_SUM * current;
-            if rounded && iteration > 1 && relative < LINEAR_RELATIVE_STEP && relative > 0.5 * step_before {
-                converged = true;
-                accepted = true;
-                break;
-            }
-            // The first attempt is nearly always accepted, so it is linearised at once.
-            let mut sum = if attempt == 0 {
-                next = problem.linearise(&trial).ok();
-                next.as_ref().map_or(f64::NAN, |next| next.sum_of_squares())
-            } else {
-                next = None;
-                problem.sum_of_squares(&trial)
-            };
-            let mut full = (damping == 0.0).then(|| step.iter().zip(&scale).map(|(s, d)| s / d).collect::<Vec<f64>>());
-            if let (Some(now), Some(before)) = (&full, &full_before)
-                && iteration > PATIENCE
-            {
-                let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-                let q = dot(now, before) / dot(before, before);
-                if (SLOW..1.0).contains(&q.abs()) {
-                    let extrapolated = after(1.0 / (1.0 - q));
-                    let of_extrapolated = problem.sum_of_squares(&extrapolated);
-                    if of_extrapolated < sum {
-                        (trial, sum, next, full) = (extrapolated, of_extrapolated, None, None);
-                    }
-                }
-            }
-            let close = rounded || relative < SMALLEST_RELATIVE_STEP * 100.0;
-            if sum.is_finite() && (sum < current || (close && sum <= current * (1.0 + 1e-9))) {
-                x = trial;
-                converged = relative < SMALLEST_RELATIVE_STEP
-                    || (!rounded && current - sum <= 1e-15 * current && relative < LINEAR_RELATIVE_STEP);
-                current = sum;
-                damping *= 0.1;
-                if damping < largest * largest * 1e-12 {
-                    damping = 0.0;
-                }
-                (step_before, full_before) = (relative, full);
-                accepted = true;
-                break;
-            }
-            next = None;
-            if relative < 1e-9 && damping == 0.0 {
-                // The full step is below rounding: this is the minimum.
-                converged = true;
-                accepted = true;
-                break;
-            }
-            damping = if damping == 0.0 { largest * largest * 1e-6 } else { damping * 10.0 };
-        }
-        if !accepted {
-            break;
-        }
-        triangle = match next {
-            Some(next) => next,
-            None => problem.linearise(&x)?,
+        let full = directions.solve(&c, 0.0);
+        let predicted = directions.explained(&c);
+        let mean = current / problem.degrees_of_freedom();
+        let after = |step: &[f64], factor: f64| -> Vec<f64> {
+            x.iter().zip(step).zip(&scale).map(|((x, step), scale)| x + factor * step * scale).collect()
         };
-        if converged {
-            return Ok(LeastSquaresSolution { x, triangle, sum_of_squares: current, iterations: iteration });
+        let end = |accepted: bool| -> LeastSquaresSolution {
+            let step: Vec<f64> = full.iter().zip(&scale).map(|(step, scale)| step * scale).collect();
+            let (x, triangle) =
+                if accepted { (after(&full, 1.0), triangle.after(&step)) } else { (x.clone(), triangle.clone()) };
+            LeastSquaresSolution { x, sum_of_squares: triangle.sum_of_squares(), triangle, iterations: iteration }
+        };
+        if predicted <= CONVERGED * mean {
+            return Ok(end(true));
+        }
+        // A decrease below the rounding of the sum cannot be seen in the sum. The minimum is reached when full steps no
+        // longer shrink.
+        let rounded = predicted < ROUNDING_OF_SUM * current;
+        if rounded && before.as_ref().is_some_and(|(_, before)| predicted > SHRINKING * before) {
+            return Ok(end(false));
+        }
+        let q = before.as_ref().map_or(0.0, |(before, _)| dot(&full, before) / dot(before, before));
+        let mut found = None;
+        for attempt in 0..MAX_ATTEMPTS {
+            let mut is_full = damping.value == 0.0 || rounded;
+            let step = if is_full { full.clone() } else { directions.solve(&c, damping.value) };
+            let mut trial = after(&step, 1.0);
+            // The first attempt is nearly always accepted, so it is linearised at once.
+            let mut next = if attempt == 0 { problem.linearise(&trial).ok() } else { None };
+            let mut sum = match (&next, attempt) {
+                (Some(next), _) => next.sum_of_squares(),
+                (None, 0) => f64::NAN,
+                (None, _) => problem.sum_of_squares(&trial),
+            };
+            if is_full && (SLOW..1.0).contains(&q.abs()) {
+                let extrapolated = after(&step, 1.0 / (1.0 - q));
+                let further = problem.sum_of_squares(&extrapolated);
+                if further < sum || (rounded && further <= sum * (1.0 + ROUNDING_OF_SUM)) {
+                    (trial, sum, next, is_full) = (extrapolated, further, None, false);
+                }
+            }
+            if sum < current || (rounded && sum <= current * (1.0 + ROUNDING_OF_SUM)) {
+                damping.accepted((current - sum) / decrease(&scaled, &c, &step), &directions, rounded);
+                found = Some((trial, next, is_full.then_some((step, predicted))));
+                break;
+            }
+            let share = |k: usize| {
+                let size = x[k].abs() + if let Scaling::Physical(_) = scaling { scale[k] } else { 0.0 };
+                (step[k] * scale[k] / size.max(f64::MIN_POSITIVE)).abs()
+            };
+            if (0..n).map(share).fold(0.0, f64::max) < ROUNDING_OF_STEP {
+                return Ok(end(false));
+            }
+            damping.rejected(&directions);
+        }
+        let Some((trial, next, step)) = found else { break };
+        (x, before) = (trial, step);
+        triangle = next.map_or_else(|| problem.linearise(&x), Ok)?;
+        current = triangle.sum_of_squares();
+    }
+    let (r, c, _) = triangle.parts();
+    let directions = Svd::of(Mat::from_fn(n, n, |i, j| r[(i, j)] * scale[j]).as_ref())?;
+    if directions.explained(&c) < NEGLIGIBLE * current / problem.degrees_of_freedom() {
+        return Ok(LeastSquaresSolution { x, triangle, sum_of_squares: current, iterations: MAX_ITERATIONS });
+    }
+    let step = directions.solve(&c, 0.0).iter().zip(&scale).map(|(step, scale)| step * scale).collect();
+    Err(IdentifyError::NoConvergence {
+        iterations: MAX_ITERATIONS,
+        sum_of_squares: current,
+        step,
+        along: String::new(),
+    })
+}
+
+/// The scales as the reciprocals of the largest column norms so far.
+fn largest_norms(r: &Mat<f64>, scale: &mut [f64]) {
+    for (j, scale) in scale.iter_mut().enumerate() {
+        let norm = r.col(j).iter().map(|entry| entry * entry).sum::<f64>().sqrt();
+        if norm > 0.0 {
+            *scale = scale.min(1.0 / norm);
+        } else if !scale.is_finite() {
+            *scale = 1.0;
         }
     }
-    // In standard deviations of the readings, a remaining decrease far below 1 is a distance from the minimum far below the
-    // uncertainty of the parameters.
-    if let Scaling::Physical(_) = scaling {
-        let (r, c, _) = triangle.parts();
-        let scaled = Mat::from_fn(n, n, |i, j| r[(i, j)] * scale[j]);
-        if Svd::of(scaled.as_ref())?.explained(&c) < NEGLIGIBLE_DECREASE {
-            return Ok(LeastSquaresSolution { x, triangle, sum_of_squares: current, iterations: MAX_ITERATIONS });
+}
+
+/// By how much a step lowers `‖c − A·η‖²`.
+fn decrease(scaled: &Mat<f64>, c: &[f64], step: &[f64]) -> f64 {
+    let along = |i: usize| step.iter().enumerate().map(|(j, step)| scaled[(i, j)] * step).sum::<f64>();
+    (0..c.len()).map(|i| (along(i), c[i])).map(|(along, c)| along * (2.0 * c - along)).sum()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// `λ`, and the factor by which the next rejection enlarges it.
+struct Damping {
+    value: f64,
+    growth: f64,
+}
+
+impl Default for Damping {
+    fn default() -> Damping {
+        Damping { value: 0.0, growth: 2.0 }
+    }
+}
+
+impl Damping {
+    /// The square of the least singular value: less damping leaves every direction as it is.
+    fn least(directions: &Svd) -> f64 {
+        let rank = directions.numerical_rank();
+        rank.checked_sub(1).map_or(0.0, |last| directions.singular_values[last].powi(2))
+    }
+
+    fn accepted(&mut self, gain: f64, directions: &Svd, rounded: bool) {
+        self.growth = 2.0;
+        if rounded {
+            return;
+        }
+        if gain < POOR_GAIN {
+            self.value = (self.value * 2.0).max(Damping::least(directions));
+        } else {
+            self.value *= (1.0 - (2.0 * gain - 1.0).powi(3)).clamp(0.1, 1.0);
+            if self.value < 1e-2 * Damping::least(directions) {
+                self.value = 0.0;
+            }
         }
     }
-    Err(IdentifyError::NoConvergence { iterations: MAX_ITERATIONS, sum_of_squares: current })
+
+    fn rejected(&mut self, directions: &Svd) {
+        self.value = if self.value == 0.0 { Damping::least(directions) } else { self.value * self.growth };
+        self.growth *= 2.0;
+    }
 }
 
 #[cfg(test)]
@@ -243,6 +274,10 @@ mod tests {
         fn sum_of_squares(&self, x: &[f64]) -> f64 {
             let rows = Poorly::rows(x);
             (0..4).map(|i| rows[(i, 2)].powi(2)).sum()
+        }
+
+        fn degrees_of_freedom(&self) -> f64 {
+            2.0
         }
     }
 
@@ -284,6 +319,10 @@ mod tests {
         fn sum_of_squares(&self, x: &[f64]) -> f64 {
             let rows = self.rows(x[0]);
             (0..2).map(|i| rows[(i, 1)].powi(2)).sum()
+        }
+
+        fn degrees_of_freedom(&self) -> f64 {
+            1.0
         }
     }
 

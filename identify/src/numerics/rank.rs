@@ -2,16 +2,26 @@
 //!
 //! The whitened Jacobian is in physical units (1 mm, 0.01 rad). A singular value `s` then means: a change by the
 //! physical size along its direction changes the readings by `s` standard deviations in total. A direction with `s < 1`
-//! is not identifiable, because even a gross error along it is below the noise. No floating-point tolerance is
-//! involved: exact null directions of a nominal geometry have singular values of 10⁻¹⁰ and lower.
+//! is not identifiable, because even a gross error along it is below the noise. Two kinds of such directions are told
+//! apart. A *structural* null direction has a singular value of zero but for rounding: it changes no reading, whatever the
+//! noise. A *weak* one changes readings by less than their noise.
+//!
+//! What the parameters are along a structural null direction is a choice of gauge. The set-up takes its part, so that the
+//! other parameters have the least change in physical size: with `Z` a basis of these directions, `Z_m` its rows of the other
+//! parameters and `β_m` these parameters,
+//!
+//! ```text
+//! β ← β − Z · Z_m⁺ · β_m
+//! ```
 //!
 //! The null space is reported in reduced row echelon form (`null_space`), in an order of preference of the
 //! parameters that follows from their identifiers.
 
-use faer::Mat;
+use faer::{Mat, MatRef};
 
 use super::null_space::{MIN_PIVOT, combinations};
 use super::solve::Svd;
+use super::tolerances::MIN_IDENTIFIABLE;
 use super::triangle::Triangle;
 use crate::error::IdentifyError;
 
@@ -21,13 +31,16 @@ pub struct Rank {
     /// Singular values in descending order, standard deviations per physical size.
     pub singular_values: Vec<f64>,
     /// A basis of the identifiable space: parameters × rank, in internal units (mm, rad). Each column is one physical
-    /// size long.
+    /// size long in the orthogonal complement of the null space, to which the gauge adds its part.
     pub identifiable_basis: Mat<f64>,
     /// Null-space combinations in scaled parameters, in reduced row echelon form. Each row is one combination, with 1
     /// at its pivot and 0 at the pivots of the other rows.
     pub null_combinations: Vec<Vec<f64>>,
     /// The pivot of each row, in the order of preference.
     pub pivots: Vec<usize>,
+    /// Of each row that is weak, the standard uncertainty along it, in physical sizes of its pivot: it changes readings, by
+    /// less than their noise. `None` of a structural one, which changes no reading.
+    pub weak_u: Vec<Option<f64>>,
     /// Orthonormal basis of the null space, in scaled parameters: parameters × (parameters − rank).
     pub null_space: Mat<f64>,
 }
@@ -39,14 +52,41 @@ impl Rank {
     /// # Errors
     /// If the factor has entries that are not finite.
     pub fn decide(triangle: &Triangle, size: &[f64], preference: &[usize]) -> Result<Rank, IdentifyError> {
+        Rank::decide_above(triangle, size, preference, (MIN_IDENTIFIABLE, 0))
+    }
+
+    /// The same with another least singular value of an identifiable direction, and with at least so many of these.
+    ///
+    /// # Errors
+    /// If the factor has entries that are not finite.
+    pub fn decide_above(
+        triangle: &Triangle,
+        size: &[f64],
+        preference: &[usize],
+        (least, at_least): (f64, usize),
+    ) -> Result<Rank, IdentifyError> {
         let n = size.len();
         let r = triangle.r();
         let scaled = Mat::from_fn(n, n, |i, j| r[(i, j)] * size[j]);
         let directions = Svd::of(scaled.as_ref())?;
-        let rank = directions.identifiable_rank();
+        let numerical = directions.numerical_rank();
+        let rank = directions.rank_above(least).max(at_least).min(numerical);
         let v = directions.right();
         let null_space = v.subcols(rank, n - rank).to_owned();
-        let (null_combinations, pivots) = combinations(null_space.as_ref(), scaled.as_ref(), preference, MIN_PIVOT);
+        let combinations = |space: MatRef<'_, f64>| combinations(space, scaled.as_ref(), preference, MIN_PIVOT);
+        let (mut null_combinations, mut pivots) = combinations(v.subcols(numerical, n - numerical));
+        let mut weak_u = vec![None; pivots.len()];
+        if numerical > rank {
+            let weak_space = without_pivots(v.subcols(rank, numerical - rank), &null_combinations, &pivots)?;
+            let (more, of_more) = combinations(weak_space.as_ref());
+            let signal = |row: &[f64]| {
+                let along = |i: usize| row.iter().enumerate().map(|(j, share)| scaled[(i, j)] * share).sum::<f64>();
+                (0..n).map(|i| along(i).powi(2)).sum::<f64>().sqrt()
+            };
+            weak_u.extend(more.iter().map(|row| Some(1.0 / signal(row).max(f64::MIN_POSITIVE))));
+            null_combinations.extend(more);
+            pivots.extend(of_more);
+        }
         // At full rank the basis is that of the parameters themselves.
         let identifiable_basis = if rank == n {
             Mat::from_fn(n, n, |i, j| if i == j { size[i] } else { 0.0 })
@@ -54,7 +94,33 @@ impl Rank {
             Mat::from_fn(n, rank, |i, k| v[(i, k)] * size[i])
         };
         let singular_values = directions.singular_values;
-        Ok(Rank { singular_values, identifiable_basis, null_combinations, pivots, null_space })
+        Ok(Rank { singular_values, identifiable_basis, null_combinations, pivots, weak_u, null_space })
+    }
+
+    /// The same with the gauge of a set-up: along structural null directions the parameters of the set-up change, the others
+    /// as little as possible.
+    ///
+    /// # Errors
+    /// If the null space has entries that are not finite.
+    pub fn with_set_up_first(mut self, is_set_up: &[bool], size: &[f64]) -> Result<Rank, IdentifyError> {
+        let structural = self.weak_u.iter().filter(|weak| weak.is_none()).count();
+        let n = size.len();
+        let others: Vec<usize> = (0..n).filter(|j| !is_set_up[*j]).collect();
+        if structural == 0 || others.len() == n {
+            return Ok(self);
+        }
+        // Null directions are in descending order of their singular values.
+        let weak = self.null_space.ncols() - structural;
+        let space = self.null_space.subcols(weak, structural);
+        let part = Mat::from_fn(others.len(), structural, |i, k| space[(others[i], k)]);
+        let inverse = Svd::of(part.as_ref())?.pseudo_inverse_above(MIN_SHARE_OF_MACHINE);
+        let basis = &mut self.identifiable_basis;
+        let of_others = Mat::from_fn(others.len(), basis.ncols(), |i, k| basis[(others[i], k)] / size[others[i]]);
+        let taken = space * (inverse * of_others);
+        for k in 0..basis.ncols() {
+            (0..n).for_each(|j| basis[(j, k)] -= taken[(j, k)] * size[j]);
+        }
+        Ok(self)
     }
 
     /// The same directions among more parameters. `kept` is the index of each of the present parameters among them,
@@ -86,16 +152,23 @@ impl Rank {
             identifiable_basis: basis,
             null_combinations: self.null_combinations.iter().map(wide).collect(),
             pivots: self.pivots.iter().map(|pivot| kept[*pivot]).collect(),
+            weak_u: self.weak_u.clone(),
             null_space,
         }
     }
 
-    /// Coordinates of parameters in the identifiable basis, by least squares; null-space parts are dropped. `size` as
-    /// in [`Rank::decide`]. Internal units.
+    /// Coordinates of parameters in the identifiable basis; null-space parts are dropped. `size` as in [`Rank::decide`].
+    /// Internal units.
     pub fn coordinates(&self, beta: &[f64], size: &[f64]) -> Vec<f64> {
-        // The columns of the basis over `size` are orthonormal.
-        (0..self.identifiable_basis.ncols())
-            .map(|k| (0..beta.len()).map(|j| self.identifiable_basis[(j, k)] / size[j] * (beta[j] / size[j])).sum())
+        let mut scaled: Vec<f64> = beta.iter().zip(size).map(|(beta, size)| beta / size).collect();
+        for null in self.null_space.col_iter() {
+            let along: f64 = null.iter().zip(&scaled).map(|(null, beta)| null * beta).sum();
+            scaled.iter_mut().zip(null.iter()).for_each(|(beta, null)| *beta -= along * null);
+        }
+        // The columns of the basis over `size`, without the part of the gauge in the null space, are orthonormal.
+        let basis = self.identifiable_basis.col_iter();
+        basis
+            .map(|column| column.iter().zip(size).zip(&scaled).map(|((entry, size), beta)| entry / size * beta).sum())
             .collect()
     }
 
@@ -109,6 +182,23 @@ impl Rank {
     pub fn is_identifiable(&self, parameter: usize) -> bool {
         self.null_combinations.iter().all(|row| row[parameter] == 0.0)
     }
+}
+
+/// Share of the other parameters in a null direction below which it is one of the set-up alone: taking a change of one
+/// physical size out of the others would move the set-up by a hundred.
+const MIN_SHARE_OF_MACHINE: f64 = 0.01;
+
+/// An orthonormal basis of the space that combinations of `space` and of `rows` span, as far as it is zero at the pivots of
+/// `rows`. `rows` are in reduced row echelon form.
+fn without_pivots(space: MatRef<'_, f64>, rows: &[Vec<f64>], pivots: &[usize]) -> Result<Mat<f64>, IdentifyError> {
+    if rows.is_empty() {
+        return Ok(space.to_owned());
+    }
+    let reduced = Mat::from_fn(space.nrows(), space.ncols(), |j, k| {
+        let along = rows.iter().zip(pivots).map(|(row, pivot)| row[j] * space[(*pivot, k)]).sum::<f64>();
+        space[(j, k)] - along
+    });
+    Ok(Svd::of(reduced.as_ref())?.left().to_owned())
 }
 
 #[cfg(test)]

@@ -68,9 +68,14 @@ impl Svd {
         self.rank(ROUNDING * self.right().nrows() as f64)
     }
 
+    /// Number of singular values of at least some size.
+    pub fn rank_above(&self, least: f64) -> usize {
+        self.singular_values.iter().filter(|s| **s >= least).count()
+    }
+
     /// Number of singular values, in standard deviations per physical size, that are identifiable and above rounding.
     pub fn identifiable_rank(&self) -> usize {
-        self.singular_values.iter().filter(|s| **s >= MIN_IDENTIFIABLE).count().min(self.numerical_rank())
+        self.rank_above(MIN_IDENTIFIABLE).min(self.numerical_rank())
     }
 
     /// The solution of least norm of `min ‖c − A·x‖² + damping·‖x‖²`. Directions below rounding are excluded.
@@ -99,6 +104,13 @@ impl Svd {
     pub fn explained(&self, c: &[f64]) -> f64 {
         let along = |k: usize| self.left().col(k).iter().zip(c).map(|(u, c)| u * c).sum::<f64>();
         (0..self.numerical_rank()).map(|k| along(k).powi(2)).sum()
+    }
+
+    /// `A⁺` over the singular values of at least some size.
+    pub fn pseudo_inverse_above(&self, least: f64) -> Mat<f64> {
+        let rank = self.rank_above(least);
+        let scaled = Mat::from_fn(self.right.nrows(), rank, |i, k| self.right[(i, k)] / self.singular_values[k]);
+        scaled * self.left.subcols(0, rank).transpose()
     }
 
     /// `W` with `W·Wᵀ = (AᵀA)⁻¹`: the right singular vectors over the singular values. Columns of directions below

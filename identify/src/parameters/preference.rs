@@ -3,6 +3,7 @@
 use super::{Parameter, Parameters, Role};
 use crate::error::IdentifyError;
 use crate::numerics::rank::Rank;
+use crate::numerics::tolerances::MIN_IDENTIFIABLE;
 use crate::numerics::triangle::Triangle;
 
 impl Parameters {
@@ -11,12 +12,23 @@ impl Parameters {
         self.list.iter().map(|parameter| parameter.size).collect()
     }
 
-    /// The rank of a whitened factor over these parameters.
+    /// The rank of a whitened factor over these parameters, in the gauge in which the set-up takes its part first.
     ///
     /// # Errors
     /// If the factor has entries that are not finite.
     pub fn rank(&self, triangle: &Triangle) -> Result<Rank, IdentifyError> {
-        Rank::decide(triangle, &self.sizes(), &pivot_preference(&self.list))
+        self.rank_above(triangle, (MIN_IDENTIFIABLE, 0))
+    }
+
+    /// The same with another least singular value of an identifiable direction, and with at least so many of these.
+    ///
+    /// # Errors
+    /// If the factor has entries that are not finite.
+    pub fn rank_above(&self, triangle: &Triangle, least: (f64, usize)) -> Result<Rank, IdentifyError> {
+        let is_set_up: Vec<bool> = self.list.iter().map(|parameter| parameter.role == Role::Setup).collect();
+        let sizes = self.sizes();
+        Rank::decide_above(triangle, &sizes, &pivot_preference(&self.list), least)?
+            .with_set_up_first(&is_set_up, &sizes)
     }
 }
 
@@ -69,6 +81,7 @@ mod tests {
             size: 1.0,
             prior: Prior::Free,
             role,
+            found: 0.0,
         };
         let coefficient = Role::Coefficient { effect: 0, coefficient: 0 };
         let mut list = vec![

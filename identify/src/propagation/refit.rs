@@ -220,6 +220,10 @@ impl LeastSquares for SimulatedFit<'_, '_> {
         Ok(whole.in_directions(&self.refit.fit.rank.identifiable_basis))
     }
 
+    fn degrees_of_freedom(&self) -> f64 {
+        self.refit.fit.degrees_of_freedom as f64
+    }
+
     fn sum_of_squares(&self, z: &[f64]) -> f64 {
         let refit = self.refit;
         let beta = refit.fit.rank.parameters_at(z);

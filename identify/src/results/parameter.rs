@@ -144,12 +144,25 @@ pub(crate) fn phases_follow_amplitudes(parameters: &mut [ParameterResult]) {
     }
 }
 
-/// A combination of parameters that leaves every reading unchanged.
+/// Why a combination of parameters has no value.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Finding {
+    /// It changes no reading, whatever the noise: the parameters are confounded.
+    #[default]
+    Structural,
+    /// It changes readings by less than their noise: its uncertainty exceeds what any such machine has.
+    Weak,
+}
+
+/// A combination of parameters that is not identifiable.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Unobservable {
     /// Coefficient of each parameter, in the parameter's display unit. A change of all parameters in this proportion
-    /// changes no reading.
+    /// changes no reading, or by less than the noise.
     pub combination: BTreeMap<String, f64>,
+    /// Whether it changes no reading, or readings by less than their noise.
+    pub finding: Finding,
     /// Explanation in words.
     pub why: String,
 }

@@ -10,7 +10,7 @@ use super::{Calibration, Function, MonteCarlo, Reference};
 use crate::monte_carlo::Distribution;
 use crate::noise::NoiseSource;
 use crate::parameter_description::error_meaning;
-use crate::results::{Interval, ParameterResult, Unobservable};
+use crate::results::{Finding, Interval, ParameterResult, Unobservable};
 
 /// Bins of a histogram in a report.
 const REPORTED_BINS: usize = 100;
@@ -302,6 +302,7 @@ impl Calibration {
             .map(|row| {
                 let terms = row.iter().enumerate().filter(|(_, value)| **value != 0.0);
                 Unobservable {
+                    finding: Finding::Structural,
                     combination: terms.map(|(k, value)| (name(k), *value)).collect(),
                     why: "no reading of these tests changes when these values change together; touch at a second direction that \
                           shares no divisor with the number of angles, or at more angles"

@@ -78,6 +78,10 @@ impl<const N: usize, F: Fn(&[Dual<N>; N], f64) -> Dual<N>> LeastSquares for Regr
         let residuals = self.readings.iter().map(|(y, x)| y - (self.model)(&b, *x).re);
         residuals.map(|r| r * r).sum()
     }
+
+    fn degrees_of_freedom(&self) -> f64 {
+        (self.readings.len() - N) as f64
+    }
 }
 
 /// Number of agreeing digits: the log relative error of NIST.
