@@ -13,6 +13,7 @@ use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::{Prior, Session, Test};
 
 use crate::error::IdentifyError;
+use crate::start::{point_mm, points};
 use crate::unit::Unit;
 use basis::BasisOverTest;
 pub(crate) use preference::{natural, pivot_preference};
@@ -54,6 +55,9 @@ pub struct Parameter {
     pub prior: Prior,
     /// The kind.
     pub role: Role,
+    /// Where it was found before the fit, less the stated value, internal units: a coordinate of a free point. Estimates
+    /// count from there.
+    pub found: f64,
 }
 
 /// The contribution of a parameter to a slot of a test: a constant, or a basis function row by row.
@@ -160,6 +164,7 @@ impl Parameters {
                 size: physical_size(unit),
                 prior: Prior::Free,
                 role: Role::Error,
+                found: 0.0,
             })?;
             for (test, model) in models.iter().enumerate() {
                 if model.effective_slots().contains(&slot) {
@@ -190,6 +195,7 @@ impl Parameters {
                         size: physical_size(unknown.unit),
                         prior,
                         role: Role::Setup,
+                        found: found_before_fit(session, test, component),
                     })?,
                 };
                 let slot = session.machine.error_slots() + component;
@@ -262,6 +268,7 @@ impl Parameters {
                 size: if largest[k] > 0.0 { size / largest[k] } else { size },
                 prior,
                 role: Role::Coefficient { effect: number, coefficient: k },
+                found: 0.0,
             })?;
         }
         for which in &effect.estimated {
@@ -272,6 +279,7 @@ impl Parameters {
                 size: width,
                 prior: Prior::Gaussian(width),
                 role: Role::Number { effect: number, number: *which },
+                found: 0.0,
             })?;
         }
         self.effects.push(effect.clone());
@@ -348,11 +356,11 @@ impl Parameters {
     }
 
     /// The value of a parameter at the parameters `beta`, internal units: a number of a shape is stated itself, not as its
-    /// change.
+    /// change; a coordinate of a point of the set-up counts from the stated one, not from where it was found.
     pub fn value(&self, parameter: usize, beta: &[f64]) -> f64 {
         match self.list[parameter].role {
             Role::Number { effect, number } => self.effects[effect].shape.number(number) + beta[parameter],
-            Role::Error | Role::Setup | Role::Coefficient { .. } => beta[parameter],
+            Role::Error | Role::Setup | Role::Coefficient { .. } => self.list[parameter].found + beta[parameter],
         }
     }
 
@@ -440,6 +448,16 @@ impl Parameters {
             })
             .collect()
     }
+}
+
+/// By how much a coordinate of a free point of a test differs from the stated one, mm.
+fn found_before_fit(session: &Session, test: &Test, component: usize) -> f64 {
+    let Some(stated) = session.tests.iter().find(|stated| stated.name == test.name) else { return 0.0 };
+    let within = |first: usize| component.checked_sub(first).filter(|coordinate| *coordinate < 3);
+    let mut sides = points(&test.station).into_iter().enumerate();
+    let place = sides.find_map(|(side, first)| Some((side, within(first?)?)));
+    let coordinate = |station| place.and_then(|(side, coordinate)| Some(point_mm(station, side)?[coordinate]));
+    coordinate(&test.station).zip(coordinate(&stated.station)).map_or(0.0, |(found, stated)| found - stated)
 }
 
 fn tighter(a: Prior, b: Prior) -> Prior {

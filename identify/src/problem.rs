@@ -13,13 +13,16 @@ pub use whitening::Filter;
 use std::ops::Range;
 use std::sync::Arc;
 
+use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::effect::Effect;
-use abbe_model::instrument::Station;
 use abbe_model::instrument::channel::{self, Channel};
+use abbe_model::instrument::{Contact, Station};
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
 use faer::Mat;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 
 use crate::error::IdentifyError;
 use crate::heldout::folds::Folds;
@@ -86,6 +89,9 @@ fn weighted(session: &Session, station: &Station<f64>, readings: Arc<Readings>) 
 
 /// Largest factor by which one step changes a number that must be positive.
 const MAX_FACTOR_OF_NUMBER: f64 = 3.0;
+/// Number of random poses of a test, at least, and the travel of a linear axis that states none, mm.
+const RANDOM_POSES: usize = 60;
+const RANDOM_TRAVEL_MM: f64 = 300.0;
 /// Mean number of readings below which runs are evaluated together.
 const SHORT_RUN: usize = 8;
 impl Problem {
@@ -94,11 +100,25 @@ impl Problem {
     /// # Errors
     /// If there are no readings, or an effect cannot be evaluated.
     pub fn new(session: &Session, noise: Noise, seed: u64) -> Result<Problem, IdentifyError> {
-        let mut tests: Vec<Test> = session.tests.iter().filter(|test| test.readings.is_some()).cloned().collect();
+        let tests: Vec<Test> = session.tests.iter().filter(|test| test.readings.is_some()).cloned().collect();
         if tests.is_empty() {
             return Err(IdentifyError::NoReadings);
         }
-        let stations = crate::start::stations(session, &tests);
+        let (tests, stations) = crate::start::located(session, tests, &noise);
+        Problem::at(session, tests, stations, noise, seed)
+    }
+
+    /// The same for tests and stations whose free points and poses are found.
+    ///
+    /// # Errors
+    /// If an effect cannot be evaluated.
+    pub(crate) fn at(
+        session: &Session,
+        mut tests: Vec<Test>,
+        stations: Vec<Station<f64>>,
+        noise: Noise,
+        seed: u64,
+    ) -> Result<Problem, IdentifyError> {
         let mut models: Vec<TestModel> = Vec::with_capacity(tests.len());
         for (test, station) in tests.iter_mut().zip(stations) {
             if let Some(readings) = &mut test.readings {
@@ -139,6 +159,38 @@ impl Problem {
             problem.add_effect(effect)?;
         }
         Ok(problem)
+    }
+
+    /// The problem of the same set-ups at random poses over the travel of the axes, of instruments that measure a pose
+    /// wherever the axes are; `None` for others, and with effects.
+    pub(crate) fn at_random_poses(&self) -> Option<Problem> {
+        let session = &self.session;
+        let is_free = |test: &Test| {
+            test.station.kind().entry().reads_poses
+                && matches!(test.station.contact(), Contact::None)
+                && !session.machine.axes.is_empty()
+        };
+        if !self.parameters.effects.is_empty() || !self.tests.iter().all(is_free) {
+            return None;
+        }
+        let mut random = Pcg64::seed_from_u64(1);
+        let poses = RANDOM_POSES.max(self.parameters.list.len());
+        let mut tests = self.tests.clone();
+        for test in &mut tests {
+            let channels = test.station.channels().len();
+            let mut within = |axis: &Axis| -> Vec<f64> {
+                let [low, high] = axis.travel.unwrap_or(match axis.kind {
+                    AxisKind::Rotary => [-std::f64::consts::PI, std::f64::consts::PI],
+                    AxisKind::Linear => [-RANDOM_TRAVEL_MM, RANDOM_TRAVEL_MM],
+                });
+                (0..poses).map(|_| low + (high - low) * random.random::<f64>()).collect()
+            };
+            let positions = session.machine.axes.iter().map(&mut within).collect();
+            let observed = vec![0.0; poses * channels];
+            test.readings = Some(Arc::new(Readings { positions, observed, channels, ..Readings::default() }));
+        }
+        let stations = self.models.iter().map(|model| model.station().clone()).collect();
+        Problem::at(session, tests, stations, self.noise.clone(), 1).ok()
     }
 
     /// Adds the coefficients of an effect to the parameters.

@@ -1,12 +1,106 @@
 //! Start values without user input: poses of instruments that stand beside the machine, orientations of bodies at the
-//! tool, positions of sockets, targets and balls.
+//! tool, positions of sockets, stations, targets and balls. The numbers that a session states for what it does not know
+//! have no influence, except along directions that its readings leave open.
+//!
+//! In this order: targets from positions (`target`), stations from distances (`distance`), poses of instruments and bodies in
+//! closed form, and the points that are left by a fit of the set-up alone to the nominal machine.
 
+mod distance;
 mod target;
 
 use abbe_model::instrument::{Group, InstrumentKind, SharedBy, Station};
-use abbe_model::session::{Session, Test};
+use abbe_model::session::{Prior, Session, Test};
 
-pub use target::with_targets;
+use crate::fit::minimum;
+use crate::noise::Noise;
+use crate::problem::Problem;
+
+/// Readings of a test that are used.
+const MAX_ROWS: usize = 300;
+
+/// Tests with readings, with the points found that have no prior, and their stations, with the poses found that are free.
+pub(crate) fn located(session: &Session, mut tests: Vec<Test>, noise: &Noise) -> (Vec<Test>, Vec<Station<f64>>) {
+    target::locate(session, &mut tests);
+    distance::locate(session, &mut tests);
+    let stations = stations(session, &tests);
+    let is_left = |test: &Test| test.station.kind().is_two_sided() && free_points(test).next().is_some();
+    if tests.iter().any(is_left)
+        && let Some(found) = set_up_alone(session, &tests, &stations, noise)
+    {
+        let stations = self::stations(session, &found);
+        return (found, stations);
+    }
+    (tests, stations)
+}
+
+/// The session with the targets, balls and stations found that have no prior. Others stay.
+pub fn with_targets(session: &Session) -> Session {
+    let mut found = session.clone();
+    target::locate(session, &mut found.tests);
+    distance::locate(session, &mut found.tests);
+    found
+}
+
+/// The points of a test that have no prior: whether of the tool, and the index of the first parameter.
+fn free_points(test: &Test) -> impl Iterator<Item = (usize, usize)> {
+    let unknown = |parameter: &usize| test.priors.get(*parameter) == Some(&Prior::Free);
+    points(&test.station).into_iter().enumerate().filter_map(move |(side, first)| {
+        first.filter(|first| (*first..first + 3).any(|parameter| unknown(&parameter))).map(|first| (side, first))
+    })
+}
+
+/// The index of the first parameter of the point on the table, or where the station stands, and of that on the tool.
+pub(crate) fn points(station: &Station<f64>) -> [Option<usize>; 2] {
+    match station {
+        // A station on the bed is no point of the table, but it is a point.
+        Station::Distance(_) => [Some(distance::STATION), Some(distance::REFLECTOR)],
+        _ => station.points().map(|point| point.map(|point| point.first)),
+    }
+}
+
+/// Whether the point of the tool frame of a test has no prior at all.
+fn is_unknown(test: &Test, first: usize) -> bool {
+    (first..first + 3).all(|parameter| test.priors.get(parameter) == Some(&Prior::Free))
+}
+
+/// The coordinates of a point of a set-up, mm.
+pub(crate) fn point_mm(station: &Station<f64>, side: usize) -> Option<[f64; 3]> {
+    station.clone().points_mut()[side].as_deref().copied()
+}
+
+/// Moves a point of the set-up to other coordinates, mm.
+fn set_point(station: &mut Station<f64>, side: usize, to: [f64; 3]) {
+    if let Some(point) = &mut station.points_mut()[side] {
+        **point = to;
+    }
+}
+
+/// The tests with their free points where a fit of the set-up alone to the nominal machine finds them. `None` where it
+/// finds nothing better.
+fn set_up_alone(session: &Session, tests: &[Test], stations: &[Station<f64>], noise: &Noise) -> Option<Vec<Test>> {
+    let alone = Session { unknowns: Vec::new(), effects: Vec::new(), ..session.clone() };
+    let problem = Problem::at(&alone, tests.to_vec(), stations.to_vec(), noise.clone(), 1).ok()?;
+    let found = minimum(&problem, None).ok()?;
+    let list = &problem.parameters.list;
+    if problem.sum_of_squares(&found.beta) >= problem.sum_of_squares(&vec![0.0; list.len()]) {
+        return None;
+    }
+    let mut moved = tests.to_vec();
+    for (position, test) in moved.iter_mut().enumerate() {
+        let slots = session.machine.error_slots();
+        for (side, first) in free_points(test).collect::<Vec<_>>() {
+            let Some(mut point) = point_mm(&test.station, side) else { continue };
+            for contribution in &problem.parameters.contributions[position] {
+                let coordinate = contribution.slot.checked_sub(slots + first).filter(|coordinate| *coordinate < 3);
+                if let Some(coordinate) = coordinate.filter(|_| list[contribution.parameter].prior == Prior::Free) {
+                    point[coordinate] += found.beta[contribution.parameter];
+                }
+            }
+            set_point(&mut test.station, side, point);
+        }
+    }
+    Some(moved)
+}
 
 /// The stations of the tests, with start values for free poses and sockets from which the iterations converge.
 pub fn stations(session: &Session, tests: &[Test]) -> Vec<Station<f64>> {

@@ -27,7 +27,7 @@ impl IdentifiedModel {
             id: parameter.id.clone(),
             role: parameter.role,
             unit: parameter.unit.clone(),
-            value: base.beta[j],
+            value: base.beta[j] + parameter.found,
             held: base.held.contains(&j),
             identifiable: fit.rank.is_identifiable(j),
             prior: parameter.prior,

@@ -1,66 +1,64 @@
 //! Where a target or a ball is that no one knows: the point of the tool frame with which the nominal machine explains the
 //! readings best.
 //!
-//! The position of a point in R is affine in the point, `P_i(t) = P_i(0) + A_i·t`. A ball in sockets therefore is a linear
-//! least-squares problem, and a target before a tracker one for a given orientation of the tracker, which alternates with
-//! the orientation for a given target (Kabsch, Acta Cryst. A32 (1976) 922).
+//! The position of a point in R is affine in the point, `P_i(t) = P_i(t₀) + A_i·(t − t₀)`. A ball in sockets therefore is a
+//! linear least-squares problem, and a target before an instrument one for a given orientation of the instrument, which
+//! alternates with the orientation for a given target (Kabsch, Acta Cryst. A32 (1976) 922). The place of instrument or
+//! socket is eliminated: positions count from their mean. Along directions that the readings leave open, the point stays
+//! where it is stated.
 
 use abbe_model::chain::Machine;
 use abbe_model::instrument::{Group, InstrumentKind, SharedBy, Station};
 use abbe_model::session::readings::Readings;
-use abbe_model::session::{Prior, Session, Test};
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use abbe_model::session::{Session, Test};
+use nalgebra::{Matrix3, Vector3};
 
-/// Readings of a test that are used.
-const MAX_ROWS: usize = 300;
+use super::{MAX_ROWS, is_unknown, set_point};
+use crate::numerics::median;
+
 /// Maximum number of alternations, and the step at which they end, mm.
 const MAX_ROUNDS: usize = 200;
 const SETTLED_MM: f64 = 1e-4;
+/// The side of the tool among the points of a set-up.
+const TOOL: usize = 1;
+/// A position is a gross error if its residual is this many times the median, and so many mm.
+const GROSS: f64 = 10.0;
+const MIN_GROSS_MM: f64 = 1.0;
+/// Singular values below this share of the number of positions leave their direction as it is stated.
+const OPEN: f64 = 1e-9;
 
-/// The session with the targets and balls found that have no prior. Others stay.
-pub fn with_targets(session: &Session) -> Session {
-    let mut found = session.clone();
-    let is_open = |test: &Test| test.readings.is_some() && is_unknown(test);
-    let mut groups: Vec<(InstrumentKind, &str)> = Vec::new();
-    for test in session.tests.iter().filter(|test| is_open(test)) {
-        let group = (test.station.kind(), test.group(SharedBy::SpindleSetup));
+/// Moves the targets and balls without a prior to where the nominal machine explains the readings best.
+pub(super) fn locate(session: &Session, tests: &mut [Test]) {
+    let is_open = |test: &Test| test.readings.is_some() && is_free(test);
+    let mut groups: Vec<(InstrumentKind, String)> = Vec::new();
+    for test in tests.iter().filter(|test| is_open(test)) {
+        let group = (test.station.kind(), test.group(SharedBy::SpindleSetup).to_string());
         if !groups.contains(&group) {
             groups.push(group);
         }
     }
     for (kind, name) in groups {
         let is_member = |test: &Test| test.station.kind() == kind && test.group(SharedBy::SpindleSetup) == name;
-        let members: Vec<Member> = session
-            .tests
+        let members: Vec<Member> = tests
             .iter()
             .filter(|test| is_open(test) && is_member(test))
             .map(|test| Member::new(session, test))
             .collect();
         let Some(target) = target(session, &members) else { continue };
-        for test in found.tests.iter_mut().filter(|test| is_member(test)) {
-            set_tool_point(&mut test.station, target);
+        for test in tests.iter_mut().filter(|test| is_member(test)) {
+            set_point(&mut test.station, TOOL, target.into());
         }
     }
-    found
 }
 
-/// Whether the point of the tool frame of a test is a tracker's target or a ball without a prior.
-fn is_unknown(test: &Test) -> bool {
-    if !matches!(test.station.kind(), InstrumentKind::Tracker | InstrumentKind::Socket) {
-        return false;
-    }
-    let points = test.station.kind().unknowns().iter().zip(&test.priors);
-    let mut of_tool = points.filter(|(unknown, _)| matches!(unknown.thing, "target" | "ball")).peekable();
-    of_tool.peek().is_some() && of_tool.all(|(_, prior)| *prior == Prior::Free)
+/// Whether the point of the tool frame of a test is a target or a ball without a prior.
+fn is_free(test: &Test) -> bool {
+    let kind = test.station.kind();
+    matches!(kind, InstrumentKind::Tracker | InstrumentKind::Pose | InstrumentKind::Socket)
+        && super::points(&test.station)[TOOL].is_some_and(|first| is_unknown(test, first))
 }
 
-fn set_tool_point(station: &mut Station<f64>, point: Vector3<f64>) {
-    if let [_, Some(own)] = station.points_mut() {
-        *own = point.into();
-    }
-}
-
-/// The readings of a test: `P_i(0)` and the columns of `A_i`, and what was observed.
+/// The readings of a test: `P_i(t₀)` and the columns of `A_i`, and what was observed.
 struct Member {
     /// The tracker or the socket.
     place: String,
@@ -77,7 +75,8 @@ impl Member {
         let step = readings.rows().div_ceil(MAX_ROWS).max(1);
         let readings = readings.of_rows(&(0..readings.rows()).step_by(step).collect::<Vec<_>>());
         let (readings, observed) = complete(&test.station, &readings);
-        let points = |at: Vector3<f64>| readings.nominal_points(&session.machine, at.into());
+        let stated = Vector3::from(test.station.tool_point_mm());
+        let points = |by: Vector3<f64>| readings.nominal_points(&session.machine, (stated + by).into());
         let origin = points(Vector3::zeros());
         let units = [Vector3::x(), Vector3::y(), Vector3::z()].map(points);
         let along =
@@ -106,76 +105,91 @@ fn complete(station: &Station<f64>, readings: &Readings) -> (Readings, Vec<Vecto
 /// The point that all members share.
 fn target(session: &Session, members: &[Member]) -> Option<Vector3<f64>> {
     let first = &members.first()?.station;
+    let stated = Vector3::from(first.tool_point_mm());
     if first.kind() == InstrumentKind::Socket {
-        let turned: Vec<Option<Matrix3<f64>>> = vec![None; members.len()];
-        return linear(members, &turned).map(|(target, _)| target);
+        return linear(members, &vec![None; members.len()], Vector3::zeros()).map(|(step, _)| stated + step);
     }
     // At the end of the chain, and where it is stated.
-    let end = session.machine.axes.last().map_or([0.0; 3], |axis| axis.origin_mm);
-    let starts = [end, first.tool_point_mm()].map(Vector3::from);
-    let found = starts.into_iter().filter_map(|start| alternated(&session.machine, members, start));
-    found.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(target, _)| target)
+    let end = session.machine.axes.last().map_or(stated, |axis| axis.origin_mm.into());
+    let starts = [stated, end].into_iter();
+    let found = starts.filter_map(|start| alternated(&session.machine, members, start - stated));
+    found.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(step, _)| stated + step)
 }
 
-/// The target with the sum of squares that it leaves, from a start.
+/// The target less the stated one with the median of squared residuals that it leaves, from a start.
 fn alternated(machine: &Machine, members: &[Member], start: Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
-    let mut target = start;
-    let mut left = f64::INFINITY;
+    let (mut step, mut left) = (start, f64::INFINITY);
     for _ in 0..MAX_ROUNDS {
         let turned: Vec<Option<Matrix3<f64>>> =
-            members.iter().map(|member| orientation(machine, members, &member.place, target)).collect();
-        let (next, squares) = linear(members, &turned)?;
-        let step = (next - target).norm();
-        (target, left) = (next, squares);
-        if step < SETTLED_MM {
+            members.iter().map(|member| orientation(machine, members, &member.place, step)).collect();
+        let (next, squares) = linear(members, &turned, step)?;
+        let change = (next - step).norm();
+        (step, left) = (next, squares);
+        if change < SETTLED_MM {
             break;
         }
     }
-    left.is_finite().then_some((target, left))
+    left.is_finite().then_some((step, left))
 }
 
-/// The orientation of a tracker for a target.
-fn orientation(machine: &Machine, members: &[Member], place: &str, target: Vector3<f64>) -> Option<Matrix3<f64>> {
+/// The orientation of an instrument for a target.
+fn orientation(machine: &Machine, members: &[Member], place: &str, step: Vector3<f64>) -> Option<Matrix3<f64>> {
     let own: Vec<(Station<f64>, &Readings)> = (members.iter())
         .filter(|member| member.place == place)
         .map(|member| {
             let mut station = member.station.clone();
-            set_tool_point(&mut station, target);
+            let target = Vector3::from(station.tool_point_mm()) + step;
+            set_point(&mut station, TOOL, target.into());
             (station, &member.readings)
         })
         .collect();
     let group = Group { machine, tests: own.iter().map(|(station, readings)| (station, *readings)).collect() };
-    match own.first()?.0.placed(&group)? {
-        Station::Tracker(tracker) => Some(Matrix3::from_fn(|i, j| tracker.stand.rotation[i][j])),
-        _ => None,
-    }
+    let stand = match own.first()?.0.placed(&group)? {
+        Station::Tracker(tracker) => tracker.stand,
+        Station::Pose(pose) => pose.stand,
+        _ => return None,
+    };
+    Some(Matrix3::from_fn(|i, j| stand.rotation[i][j]))
 }
 
-/// The target and the place of each tracker or socket for given orientations, by least squares; and the sum of squares.
-fn linear(members: &[Member], turned: &[Option<Matrix3<f64>>]) -> Option<(Vector3<f64>, f64)> {
+/// The target less the stated one for given orientations, by least squares, without the gross errors at `before`; and the
+/// median of the squared residuals there.
+fn linear(members: &[Member], turned: &[Option<Matrix3<f64>>], before: Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
     let mut places: Vec<&str> = members.iter().map(|member| member.place.as_str()).collect();
     places.sort_unstable();
     places.dedup();
-    let count = 3 + 3 * places.len();
-    let (mut normal, mut right, mut squares) = (DMatrix::zeros(count, count), DVector::zeros(count), 0.0);
-    for (member, turned) in members.iter().zip(turned) {
-        let place = 3 + 3 * places.iter().position(|place| *place == member.place)?;
-        let turn = turned.unwrap_or_else(Matrix3::identity);
-        for (i, (origin, along)) in member.origin.iter().zip(&member.along).enumerate() {
-            // R·(P(0) + A·t) + p = m before a tracker, P(0) + A·t − s = 0 in a socket.
-            let (sign, observed) =
-                if turned.is_some() { (1.0, *member.observed.get(i)?) } else { (-1.0, Vector3::zeros()) };
-            let (matrix, rest) = (turn * along, observed - turn * origin);
-            for row in 0..3 {
-                let mut line = DVector::zeros(count);
-                (0..3).for_each(|k| line[k] = matrix[(row, k)]);
-                line[place + row] = sign;
-                normal.ger(1.0, &line, &line, 1.0);
-                right.axpy(rest[row], &line, 1.0);
-                squares += rest[row] * rest[row];
+    let (mut normal, mut right, mut squares) = (Matrix3::zeros(), Vector3::zeros(), Vec::new());
+    for place in places {
+        // R·(P + A·t) + p = m before an instrument, P + A·t = s in a socket.
+        let mut rows: Vec<(Matrix3<f64>, Vector3<f64>)> = Vec::new();
+        for (member, turned) in members.iter().zip(turned).filter(|(member, _)| member.place == place) {
+            let turn = turned.unwrap_or_else(Matrix3::identity);
+            for (i, (origin, along)) in member.origin.iter().zip(&member.along).enumerate() {
+                let observed = if turned.is_some() { *member.observed.get(i)? } else { Vector3::zeros() };
+                rows.push((turn * along, observed - turn * origin));
             }
         }
+        let apart = |rows: &[(Matrix3<f64>, Vector3<f64>)]| -> Vec<f64> {
+            let left: Vec<Vector3<f64>> = rows.iter().map(|(matrix, rest)| rest - matrix * before).collect();
+            let middle = Vector3::from_fn(|k, _| median(&mut left.iter().map(|v| v[k]).collect::<Vec<_>>()));
+            left.iter().map(|left| (left - middle).norm()).collect()
+        };
+        let distances = apart(&rows);
+        squares.extend(distances.iter().map(|distance| distance * distance));
+        let limit = (GROSS * median(&mut distances.clone())).max(MIN_GROSS_MM);
+        let kept: Vec<_> =
+            rows.iter().zip(&distances).filter(|(_, distance)| **distance <= limit).map(|(row, _)| row).collect();
+        let share = 1.0 / kept.len().max(1) as f64;
+        let mean_matrix = kept.iter().map(|(matrix, _)| matrix).sum::<Matrix3<f64>>() * share;
+        let mean_rest = kept.iter().map(|(_, rest)| rest).sum::<Vector3<f64>>() * share;
+        for (matrix, rest) in kept {
+            let (matrix, rest) = (matrix - mean_matrix, rest - mean_rest);
+            normal += matrix.transpose() * matrix;
+            right += matrix.transpose() * rest;
+        }
     }
-    let solution = normal.svd(true, true).solve(&right, 1e-9).ok()?;
-    Some((Vector3::new(solution[0], solution[1], solution[2]), squares - right.dot(&solution)))
+    let svd = normal.svd(true, true);
+    // Rotations that differ have singular values of the number of positions.
+    let step = svd.solve(&right, OPEN * squares.len() as f64).ok()?;
+    Some((step, median(&mut squares)))
 }

@@ -8,6 +8,7 @@ pub mod conformity;
 pub mod conformity_set_up;
 pub mod conformity_shares;
 pub mod doors;
+pub mod free_set_ups;
 pub mod geometric;
 pub mod left_out_test;
 pub mod measured;

@@ -1,0 +1,128 @@
+//! Where a station stands that reads distances, and where its reflector is, by multilateration.
+//!
+//! With the reflector at `P_i` in the frame of the station, the station at `S₀ + δ` and the dead path `D₀`, the squares of the
+//! distances are linear in `δ`, `D₀` and `k = ‖δ‖² − D₀²`:
+//!
+//! ```text
+//! D_i² − ‖P_i − S₀‖² = −2 (P_i − S₀)·δ + 2 D_i·D₀ + k
+//! ```
+//!
+//! The same holds for the reflector with the roles exchanged. Where both are unknown they are found in turn.
+
+use abbe_model::chain::{BodyErrors, Machine};
+use abbe_model::frames::Point;
+use abbe_model::instrument::distance::{Distance, StationFrame};
+use abbe_model::instrument::{SharedBy, Station};
+use abbe_model::session::readings::Readings;
+use abbe_model::session::{Prior, Session, Test};
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::{MAX_ROWS, is_unknown};
+
+/// The first parameters of station and reflector, and that of the dead path.
+pub(super) const STATION: usize = 0;
+pub(super) const REFLECTOR: usize = 3;
+const ZERO: usize = 6;
+/// Maximum number of turns, and the step at which they end, mm.
+const MAX_ROUNDS: usize = 100;
+const SETTLED_MM: f64 = 1e-6;
+/// Singular values below this share of the largest leave their direction as it is stated.
+const OPEN: f64 = 1e-9;
+
+/// Moves stations and reflectors without a prior to where the nominal machine explains the distances best.
+pub(super) fn locate(session: &Session, tests: &mut [Test]) {
+    let is_open = |test: &Test| {
+        matches!(test.station, Station::Distance(_)) && (is_unknown(test, STATION) || is_unknown(test, REFLECTOR))
+    };
+    if !tests.iter().any(is_open) {
+        return;
+    }
+    for _ in 0..MAX_ROUNDS {
+        let mut largest = 0.0_f64;
+        for (first, by) in [(STATION, SharedBy::Setup), (REFLECTOR, SharedBy::SpindleSetup)] {
+            let open = |test: &Test| matches!(test.station, Station::Distance(_)) && is_unknown(test, first);
+            let mut groups: Vec<String> =
+                tests.iter().filter(|test| open(test)).map(|test| test.group(by).into()).collect();
+            groups.sort_unstable();
+            groups.dedup();
+            for group in groups {
+                let members: Vec<usize> =
+                    (0..tests.len()).filter(|k| open(&tests[*k]) && tests[*k].group(by) == group).collect();
+                let Some(step) = step(&session.machine, tests, &members, first) else { continue };
+                largest = largest.max(step.norm());
+                for member in members {
+                    if let Station::Distance(distance) = &mut tests[member].station {
+                        let point = if first == STATION { &mut distance.station } else { &mut distance.reflector };
+                        point.iter_mut().zip(step.iter()).for_each(|(x, step)| *x += step);
+                    }
+                }
+            }
+        }
+        if largest < SETTLED_MM {
+            return;
+        }
+    }
+}
+
+/// The step of a station, or of a reflector, that tests share. Each station has a dead path of its own.
+fn step(machine: &Machine, tests: &[Test], members: &[usize], first: usize) -> Option<Vector3<f64>> {
+    let mut places: Vec<&str> = members.iter().map(|member| tests[*member].setup.as_str()).collect();
+    places.sort_unstable();
+    places.dedup();
+    let count = 3 + 2 * places.len();
+    let mut rows: Vec<(DVector<f64>, f64)> = Vec::new();
+    for member in members {
+        let test = &tests[*member];
+        let (Station::Distance(distance), Some(readings)) = (&test.station, &test.readings) else { continue };
+        let has_zero = test.priors.get(ZERO) == Some(&Prior::Free);
+        let place = 3 + 2 * places.iter().position(|place| *place == test.setup)?;
+        for (apart, read) in sights(machine, distance, readings, first) {
+            let mut row = DVector::zeros(count);
+            (0..3).for_each(|k| row[k] = 2.0 * apart[k]);
+            row[place] = if has_zero { 2.0 * read } else { 0.0 };
+            row[place + 1] = 1.0;
+            rows.push((row, read * read - apart.norm_squared()));
+        }
+    }
+    // Lengths of metres have squares of 10⁶: columns of similar length keep the digits.
+    let mut matrix = DMatrix::from_fn(rows.len(), count, |i, k| rows[i].0[k]);
+    let right = DVector::from_iterator(rows.len(), rows.iter().map(|(_, right)| *right));
+    let scale: Vec<f64> = matrix.column_iter().map(|column| column.norm().max(f64::MIN_POSITIVE)).collect();
+    let longest = scale[..3].iter().copied().fold(0.0, f64::max);
+    for (k, mut column) in matrix.column_iter_mut().enumerate() {
+        column /= if k < 3 { longest } else { scale[k] };
+    }
+    let solution = matrix.svd(true, true).solve(&right, OPEN * (rows.len() as f64).sqrt()).ok()?;
+    let step = Vector3::new(solution[0], solution[1], solution[2]) / longest;
+    step.iter().all(|x| x.is_finite()).then_some(step)
+}
+
+/// From the other point to the one that moves, in the frame of the latter, mm, and the distance that was read.
+fn sights(machine: &Machine, distance: &Distance<f64>, readings: &Readings, first: usize) -> Vec<(Vector3<f64>, f64)> {
+    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+    let mut state = Vec::new();
+    let every = readings.rows().div_ceil(MAX_ROWS).max(1);
+    let mut sights = Vec::new();
+    for row in (0..readings.rows()).step_by(every) {
+        readings.state(machine, row, &mut state);
+        let read = readings.observed[row * readings.channels];
+        let apart = if first == STATION {
+            let reflector = machine.tool_point::<f64>(&state, &none, Point(distance.reflector));
+            let seen = match distance.frame {
+                StationFrame::Table => machine.table_point(&state, &none, reflector),
+                StationFrame::Bed => reflector,
+            };
+            Vector3::from(distance.station) - Vector3::from(seen.0)
+        } else {
+            let station = match distance.frame {
+                StationFrame::Table => machine.workpiece_point::<f64>(&state, &none, Point(distance.station)),
+                StationFrame::Bed => Point(distance.station),
+            };
+            Vector3::from(distance.reflector) - Vector3::from(machine.spindle_point(&state, &none, station).0)
+        };
+        if read.is_finite() {
+            sights.push((apart, read));
+        }
+    }
+    sights
+}
