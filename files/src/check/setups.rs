@@ -1,6 +1,7 @@
 //! Set-ups shared by tests.
 
 use abbe_model::instrument::{InstrumentKind, SharedBy};
+use abbe_model::session::readings::Readings;
 use abbe_model::session::{Prior, Test};
 
 /// Warnings about a test that shares a mounted object with an earlier one and describes it differently.
@@ -33,4 +34,18 @@ pub(crate) fn differing(earlier: &[Test], test: &Test) -> Vec<String> {
 fn mounted_groups(kind: InstrumentKind) -> Vec<SharedBy> {
     let groups = [SharedBy::Setup, SharedBy::SpindleSetup, SharedBy::BarSetup];
     groups.into_iter().filter(|group| kind.shares(*group)).collect()
+}
+
+/// A warning for each test whose positions and readings a test has already: one file stands for two measurements.
+pub(crate) fn repeated(tests: &[Test], test: &Test) -> Option<String> {
+    let own = test.readings.as_deref()?;
+    let is_same = |other: &&Test| {
+        let same = |other: &Readings| other.positions == own.positions && other.observed == own.observed;
+        other.readings.as_deref().is_some_and(same)
+    };
+    let other = tests.iter().find(is_same)?;
+    Some(format!(
+        "tests \"{}\" and \"{}\" have the same positions and readings: is one file named twice? Both count as measured",
+        other.name, test.name
+    ))
 }

@@ -165,6 +165,7 @@ pub(crate) fn add(session: &mut Session, document: Parts<'_>, surroundings: &Sur
         });
         for test in parts {
             found.warnings.extend(check::setups::differing(&tests, &test));
+            found.warnings.extend(check::setups::repeated(&tests, &test));
             tests.push(test);
         }
     }

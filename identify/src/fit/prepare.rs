@@ -161,8 +161,12 @@ fn prepare_at_lever(session: &Session, effects: &[Effect], seed: u64) -> Result<
 /// Fits a problem, in turn with its noise and its outliers.
 fn settled(mut problem: Problem, floor: f64) -> Result<(Problem, Fit), IdentifyError> {
     if problem.session.stated_noise_mm().is_none() {
-        problem.noise =
-            Noise::white(nominal_residual_mm(&problem)?.max(floor).max(MIN_NOISE_MM), NoiseSource::Residual);
+        let nominal = problem.residuals(&vec![0.0; problem.parameters.list.len()]);
+        let (sigma_mm, source) = match ShownNoise::of(&problem.tests, &nominal, |_, _| true) {
+            Some(shown) => (shown.sigma_mm, shown.source),
+            None => (nominal_residual_mm(&problem)?, NoiseSource::Residual),
+        };
+        problem.noise = Noise::white(sigma_mm.max(floor).max(MIN_NOISE_MM), source);
     }
     let found = fit_with_numbers(&mut problem, None);
     let mut fit = plausibility::checked(&problem, found)?;

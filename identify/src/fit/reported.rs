@@ -1,7 +1,5 @@
 //! A fit in the form of its results: display units, words, and the lists of what is not identifiable and of outliers.
 
-use std::collections::BTreeMap;
-
 use abbe_model::effect::description::meaning;
 
 use super::outcome::{self, Determined};
@@ -12,13 +10,14 @@ use crate::circular;
 use crate::error::IdentifyError;
 use crate::heldout::cross_validation;
 use crate::heldout::{mislabelled_runs, rms_by_unit_mm, rms_mm};
+use crate::identifiability::weak;
 use crate::noise;
 use crate::numerics::rank::Rank;
 use crate::parameter_description::parameter_meaning;
 use crate::plausibility;
 use crate::positioning::{self, diagonal};
 use crate::problem::Problem;
-use crate::results::{FitResult, OfAngles, Outlier, ParameterResult, Unobservable, phases_follow_amplitudes};
+use crate::results::{Finding, FitResult, OfAngles, Outlier, ParameterResult, Unobservable, phases_follow_amplitudes};
 use crate::straightness;
 use crate::tolerance::conformity;
 use crate::unit::{ARCSEC, Unit};
@@ -36,6 +35,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
     warnings.extend(plausibility::warnings(&plausibility));
     warnings.extend(plausibility::coefficients::warnings(problem, fit));
     warnings.extend(noise::stated_against_repeats(problem, &fit.residuals));
+    warnings.extend(noise::rigid_targets(problem));
     warnings.extend(noise::silent_channels(problem, &fit.residuals, fit.rank.identifiable_basis.ncols()));
     warnings.extend(mislabelled_runs(&problem.tests));
     warnings.extend(enlargement_warning(fit.u_enlargement));
@@ -210,35 +210,31 @@ pub fn ids(problem: &Problem, parameters: &[ParameterResult]) -> Vec<String> {
 /// The null-space combinations, in display units and in words.
 pub fn unobservable(problem: &Problem, rank: &Rank) -> Vec<Unobservable> {
     let list = &problem.parameters.list;
-    rank.null_combinations
-        .iter()
-        .zip(&rank.pivots)
-        .map(|(row, pivot)| {
-            let others = (0..row.len()).filter(|j| j != pivot && row[*j] != 0.0);
-            let displayed: Vec<(usize, f64)> = std::iter::once(*pivot)
-                .chain(others)
-                .map(|j| (j, row[j] * list[j].size * list[j].unit.display_per_internal))
-                .collect();
-            let leading = displayed.first().map_or(1.0, |(_, value)| *value);
-            let combination: BTreeMap<String, f64> = displayed
-                .iter()
-                .map(|(j, value)| (list[*j].id.clone(), value / leading))
-                .collect();
-            let why = match displayed.as_slice() {
-                [(j, _)] => format!("no reading of these tests changes with {}", list[*j].id),
-                [(first, _), rest @ ..] => {
-                    let others: Vec<&str> = rest.iter().map(|(j, _)| list[*j].id.as_str()).collect();
-                    format!(
-                        "{} is confounded with {}: null-space direction, in this proportion they leave every reading unchanged",
-                        list[*first].id,
-                        others.join(", ")
-                    )
-                }
-                [] => String::new(),
-            };
-            Unobservable { combination, why }
-        })
-        .collect()
+    let rows = rank.null_combinations.iter().zip(&rank.pivots).zip(&rank.weak_u);
+    rows.map(|((row, pivot), weak_u)| {
+        let others = (0..row.len()).filter(|j| j != pivot && row[*j] != 0.0);
+        let displayed: Vec<(usize, f64)> = std::iter::once(*pivot)
+            .chain(others)
+            .map(|j| (j, row[j] * list[j].size * list[j].unit.display_per_internal))
+            .collect();
+        let leading = displayed.first().map_or(1.0, |(_, value)| *value);
+        let combination = displayed.iter().map(|(j, value)| (list[*j].id.clone(), value / leading)).collect();
+        let leader = &list[*pivot];
+        let others: Vec<&str> = displayed[1..].iter().map(|(j, _)| list[*j].id.as_str()).collect();
+        let (finding, why) = match weak_u {
+            Some(u) => (Finding::Weak, weak(leader, &others, *u)),
+            None if others.is_empty() => {
+                (Finding::Structural, format!("no reading of these tests changes with {}", leader.id))
+            }
+            None => {
+                let others = others.join(", ");
+                let words = "null-space direction, in this proportion they leave every reading unchanged";
+                (Finding::Structural, format!("{} is confounded with {others}: {words}", leader.id))
+            }
+        };
+        Unobservable { combination, finding, why }
+    })
+    .collect()
 }
 
 /// The excluded outliers, by test, file and line.

@@ -55,7 +55,7 @@ fn seen(tests: &[Test], kept: impl Fn(usize, usize) -> bool) -> Vec<Vec<Vec<Vect
         if channels.len() != 3 || channels.iter().any(|channel| channel.is_angle()) {
             continue;
         }
-        let keys = RepeatKeys::of(readings);
+        let keys = RepeatKeys::between_tests(readings);
         let mut times: BTreeMap<&[i64], usize> = BTreeMap::new();
         for (row, values) in readings.observed.chunks_exact(channels.len()).enumerate() {
             let Some(seen) = test.station.measured_mm(values) else { break };

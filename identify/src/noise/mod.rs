@@ -23,6 +23,7 @@ use abbe_model::session::readings::Readings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::problem::Problem;
 pub(crate) use autocorrelation::enlargement_of_mean;
 pub use autocorrelation::{Autocorrelation, Process, along_runs};
 pub(crate) use stated::silent_channels;
@@ -137,8 +138,25 @@ impl ShownNoise {
             return Some(ShownNoise { sigma_mm, freedom: pure.freedom, source: NoiseSource::Repeats });
         }
         let (sigma_mm, freedom) = flange::noise_of_targets(tests, kept)?;
-        Some(ShownNoise { sigma_mm, freedom, source: NoiseSource::Targets })
+        // Targets that keep their distances exactly were solved as one body: they show no noise.
+        (sigma_mm > RIGID_MM).then_some(ShownNoise { sigma_mm, freedom, source: NoiseSource::Targets })
     }
+}
+
+/// Noise of targets below which their instrument has solved them as one rigid body: no instrument reads places in space to
+/// 0.05 µm.
+const RIGID_MM: f64 = 5e-5;
+
+/// What is said of targets that keep their distances exactly.
+pub fn rigid_targets(problem: &Problem) -> Option<String> {
+    let kept = |test: usize, row: usize| !problem.rejected[test][row];
+    let (sigma_mm, _) = flange::noise_of_targets(&problem.tests, kept).filter(|(sigma_mm, _)| *sigma_mm <= RIGID_MM)?;
+    let stated = problem.session.keys_of_noise();
+    Some(format!(
+        "the targets keep their distances to {:.3} µm: the instrument has solved them as one rigid body, so that they show no \
+         noise; the noise is that of {stated}, or of the residual where none is stated",
+        sigma_mm * 1e3
+    ))
 }
 
 /// Pure error: residuals (rows × channels, mm) without the trend of their run and their mean over repeats, rescaled
@@ -264,6 +282,11 @@ fn deviations(
 /// Least share of the variance that the trends must leave.
 const MIN_VARIANCE_SHARE: f64 = 0.05;
 
+/// A position as an integer: positions agree to 0.1 µm or 10⁻⁴ rad.
+fn key(position: f64) -> i64 {
+    (position * 1e4).round() as i64
+}
+
 /// The position of a reading as integers that are equal for repeats: axis positions and directions of travel, without
 /// those that are equal in all rows.
 struct RepeatKeys {
@@ -272,12 +295,19 @@ struct RepeatKeys {
 }
 
 impl RepeatKeys {
+    /// Of readings that are compared within their test.
     fn of(readings: &Readings) -> RepeatKeys {
-        let directions = if readings.run.is_empty() { Vec::new() } else { directions(readings) };
-        // Positions agree to 0.1 µm or 10⁻⁴ rad.
-        let key = |position: f64| (position * 1e4).round() as i64;
         let differs = |column: &&Vec<f64>| column.iter().any(|position| key(*position) != key(column[0]));
-        let moving: Vec<&Vec<f64>> = readings.positions.iter().filter(differs).collect();
+        RepeatKeys::of_axes(readings, readings.positions.iter().filter(differs).collect())
+    }
+
+    /// Of readings that are compared with those of other tests: axes that are equal in all rows of one test count too.
+    fn between_tests(readings: &Readings) -> RepeatKeys {
+        RepeatKeys::of_axes(readings, readings.positions.iter().collect())
+    }
+
+    fn of_axes(readings: &Readings, moving: Vec<&Vec<f64>>) -> RepeatKeys {
+        let directions = if readings.run.is_empty() { Vec::new() } else { directions(readings) };
         let has_directions = directions.iter().any(|direction| *direction != directions[0]);
         let columns = moving.len() + usize::from(has_directions);
         let mut keys = Vec::with_capacity(readings.rows() * columns);
