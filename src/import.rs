@@ -273,6 +273,8 @@ fn checked(
                 | ConflictKind::Statement
         )
     };
+    // Without a cause that was tested, a conflict remains a warning.
+    let Some(diagnosis) = plausibility::explained(&found) else { return Ok(found) };
     if allow_implausible || !found.conflicts.iter().any(|conflict| of_readings(conflict.kind)) {
         return Ok(found);
     }
@@ -281,9 +283,6 @@ fn checked(
         .map(|conflict| conflict.words.as_str())
         .take(MAX_NAMED)
         .collect();
-    let diagnosis = plausibility::explained(&found).unwrap_or_else(|| {
-        "check the units, signs and order of the columns, and whether the data belong to this machine".to_string()
-    });
     Err(IdentifyError::Contradicted { found: conflicts.join("; "), diagnosis })
 }
 

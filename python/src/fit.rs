@@ -5,6 +5,7 @@ use std::sync::Arc;
 use abbe::document::{Call, Document, StatedFit};
 use abbe::identify::fit::Fit as Estimated;
 use abbe::identify::model_file::IdentifiedModel;
+use abbe::identify::plausibility;
 use abbe::identify::problem::Problem;
 use abbe::report::block::Report;
 use abbe::report::commands::Commands;
@@ -31,10 +32,16 @@ pub struct Fit {
 #[pymethods]
 impl Fit {
     #[staticmethod]
-    fn of(py: Python<'_>, session: &Session, seed: u64) -> PyResult<Fit> {
+    fn of(py: Python<'_>, session: &Session, seed: u64, allow_implausible: bool) -> PyResult<Fit> {
         let state = session.state();
         let own = Arc::clone(&state);
-        let fit = work::run(py, None, move |_| Ok(SessionFit::of(&own.session, seed)?))?;
+        let fit = work::run(py, None, move |_| {
+            let fit = SessionFit::of(&own.session, seed)?;
+            if !allow_implausible {
+                plausibility::accepted(&fit.result.plausibility)?;
+            }
+            Ok(fit)
+        })?;
         Ok(Fit { state, seed, fit: Arc::new(fit) })
     }
 
@@ -99,7 +106,7 @@ pub fn call(command: &str) -> Call {
 /// Estimates of all parameters in display units.
 pub fn estimates(problem: &Problem, fit: &Estimated) -> Vec<f64> {
     let list = problem.parameters.list.iter().zip(&fit.beta);
-    list.map(|(parameter, value)| value * parameter.unit.display_per_internal).collect()
+    list.map(|(parameter, value)| (parameter.found + value) * parameter.unit.display_per_internal).collect()
 }
 
 /// The tables of estimates: errors and effects, then the set-up.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use abbe::document::{Call, Document, StatedTrace};
+use abbe::identify::plausibility;
 use abbe::plan::separating_tests::separate_aliases;
 use abbe::plan::test_variations::TestVariations;
 use abbe::report::block::Report;
@@ -60,6 +61,7 @@ impl Trace {
         exclude: Vec<String>,
         time_limit_s: Option<f64>,
         seed: u64,
+        allow_implausible: bool,
     ) -> PyResult<Trace> {
         let deadline = deadline(time_limit_s)?;
         let state = session.state();
@@ -76,6 +78,9 @@ impl Trace {
             let should_continue = || deadline.is_none_or(|deadline| Instant::now() < deadline);
             let report = |progress: Progress| reported(caller, &progress) && should_continue();
             let mut trace = trace::trace(&own.session, &options, &report)?;
+            if !allow_implausible {
+                plausibility::accepted(&trace.result.plausibility)?;
+            }
             if caller.report("comparing candidate tests".to_string()) && should_continue() {
                 separate_aliases(&mut trace, &TestVariations::short(), &report)?;
             }

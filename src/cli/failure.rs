@@ -42,9 +42,6 @@ pub enum Failure {
     /// Options that contradict each other.
     #[error("{0}")]
     CommandLine(String),
-    /// Estimates that mean nothing.
-    #[error("{0}")]
-    Implausible(String),
     /// The user interrupted the work. The results found until then have been written.
     #[error("{0}")]
     Interrupted(String),
@@ -131,7 +128,7 @@ impl Failure {
                 | ModelError::Plan { help, .. }
                 | ModelError::Session { help, .. },
             ) => tell(Kind::Help, help),
-            Failure::Implausible(_) => {
+            Failure::Identify(IdentifyError::Implausible { .. }) => {
                 tell(
                     Kind::Help,
                     "`--allow-implausible` accepts it: for a machine that really is that far from its drawing",

@@ -49,7 +49,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use abbe::files::{self, ReadOptions, SourceMap};
-use abbe::identify::plausibility::{self, ConflictKind, Plausibility};
+use abbe::identify::plausibility::{self, Plausibility};
 use abbe::model::session::Session;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
@@ -174,7 +174,8 @@ impl DataArguments {
 /// What an identification does with estimates that mean nothing.
 #[derive(Args, Clone, Copy)]
 pub struct PlausibilityArguments {
-    /// Accept readings that contradict the machine, such as location errors above 5 % of a link.
+    /// Accept estimates that mean nothing, such as axes more than 5 % of a link beside their place, though another reading of
+    /// the file explains them.
     #[arg(long)]
     allow_implausible: bool,
 }
@@ -190,13 +191,9 @@ impl PlausibilityArguments {
         Ok(())
     }
 
-    /// Refuses estimates that mean nothing: location errors of a robot that are a large share of its links.
+    /// Refuses estimates that mean nothing and have a cause.
     fn check(self, found: &Plausibility) -> Result<(), Failure> {
-        let conflict = found.conflicts.iter().find(|conflict| conflict.kind == ConflictKind::LocationError);
-        let Some(conflict) = conflict.filter(|_| !self.allow_implausible) else { return Ok(()) };
-        let why = plausibility::explained(found);
-        let why = why.unwrap_or_else(|| "check the units, signs and order of the columns".to_string());
-        Err(Failure::Implausible(format!("{}; {why}", conflict.words)))
+        if self.allow_implausible { Ok(()) } else { Ok(plausibility::accepted(found)?) }
     }
 }
 

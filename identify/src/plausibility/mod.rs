@@ -7,7 +7,8 @@
 //! - a residual of a hundred times the noise in every test;
 //! - poses of which the model explains less than 99 % of the variance (`poses`);
 //! - orientations of poses of which the model leaves more than 3°;
-//! - location errors above 5 % of the link and zero angles above 10°, of poses (`locations`).
+//! - axes more than 5 % of the link beside their place, or tilted by 0.05 rad, and zero angles above 10°, of poses
+//!   (`locations`).
 //!
 //! Mistakes are found by refits of the session with one statement changed at a time (`hypotheses`, `suggest`).
 
@@ -84,6 +85,7 @@ pub fn examine(problem: &Problem, fit: &Fit) -> Plausibility {
 /// # Errors
 /// If the fit failed, or nothing is identifiable.
 pub(crate) fn checked(problem: &Problem, fit: Result<Fit, IdentifyError>) -> Result<Fit, IdentifyError> {
+    let mut failed = None;
     let found = match fit {
         // Noise that is stated may well be larger than anything that the tests show.
         Ok(fit)
@@ -100,7 +102,8 @@ pub(crate) fn checked(problem: &Problem, fit: Result<Fit, IdentifyError>) -> Res
             problem.unit().symbol()
         ),
         // The diagnosis takes the place of the advice of this error.
-        Err(IdentifyError::NoConvergence { iterations, sum_of_squares }) => {
+        Err(error @ IdentifyError::NoConvergence { iterations, sum_of_squares, .. }) => {
+            failed = Some(error);
             format!("no convergence after {iterations} iterations (the sum of squares is {sum_of_squares:.3e})")
         }
         Err(error) => return Err(error),
@@ -110,13 +113,30 @@ pub(crate) fn checked(problem: &Problem, fit: Result<Fit, IdentifyError>) -> Res
     } else {
         poses::suggestions(problem)
     };
-    let diagnosis = match in_words(&suggestions) {
-        Some(words) => words,
-        None => {
-            "check the units, signs and order of the columns, and whether the data belong to this machine".to_string()
+    match (in_words(&suggestions), failed) {
+        (Some(diagnosis), _) => Err(IdentifyError::Contradicted { found, diagnosis }),
+        (None, Some(error)) => Err(error),
+        (None, None) => {
+            let check = "check the units, signs and order of the columns, and whether the data belong to this machine";
+            Err(IdentifyError::Contradicted { found, diagnosis: check.to_string() })
         }
-    };
-    Err(IdentifyError::Contradicted { found, diagnosis })
+    }
+}
+
+/// Refuses estimates that mean nothing and have a cause that was tested: axes of a robot far beside their place, where
+/// another reading of the file lowers the residual of the nominal machine at least threefold. Without such a cause they
+/// remain a warning.
+///
+/// # Errors
+/// [`IdentifyError::Implausible`] with the conflict and its cause.
+pub fn accepted(found: &Plausibility) -> Result<(), IdentifyError> {
+    let conflict = found.conflicts.iter().find(|conflict| conflict.kind == ConflictKind::LocationError);
+    match (conflict, in_words(&found.suggestions)) {
+        (Some(conflict), Some(diagnosis)) => {
+            Err(IdentifyError::Implausible { found: conflict.words.clone(), diagnosis })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// One warning per conflict; set-up parameters share one. The last also names the mistakes that explain the conflicts.

@@ -13,12 +13,11 @@ use super::results::{Suggestion, SuggestionKind};
 use crate::noise::{Noise, NoiseSource};
 use crate::numerics::parallel;
 use crate::problem::Problem;
-use crate::start::with_targets;
 
 /// Poses that are refitted with each mistake.
 const MAX_POSES: usize = 300;
 /// Least factor by which a mistake lowers the residual of the nominal machine.
-const LOWERED: f64 = 5.0;
+const LOWERED: f64 = 3.0;
 /// Mistakes whose residual is below this multiple of the least residual are also listed.
 const NOT_SEPARABLE: f64 = 1.5;
 /// Maximum number of listed mistakes.
@@ -73,7 +72,6 @@ pub(super) fn nominal_misfit(session: &Session) -> Option<f64> {
     let mut nominal = thinned(&Problem::new(session, noise.clone(), 1).ok()?, MAX_POSES);
     nominal.unknowns.clear();
     nominal.effects.clear();
-    let nominal = with_targets(&nominal);
     let problem = Problem::new(&nominal, noise.clone(), 1).ok()?;
     Some(trial(&nominal, &noise)?.rms_mm / spread_mm2(&problem).map_or(1.0, f64::sqrt))
 }
@@ -87,10 +85,9 @@ pub(super) fn suggestions(problem: &Problem) -> Vec<Suggestion> {
     // A turn of a radian weighs as much as the spread. The lever of a session that states no noise follows from the residual,
     // and hides orientations that are misread.
     nominal.lever_mm = spread_mm2(problem).map_or(nominal.lever_mm, f64::sqrt);
-    let base_mm = trial(&with_targets(&nominal), &noise).map_or(f64::INFINITY, |found| found.rms_mm);
+    let base_mm = trial(&nominal, &noise).map_or(f64::INFINITY, |found| found.rms_mm);
     let hypotheses = of_poses(&nominal);
-    // A target without a prior is looked for with each mistake.
-    let found = parallel::map(hypotheses.len(), &|k| trial(&with_targets(&hypotheses[k].session), &noise));
+    let found = parallel::map(hypotheses.len(), &|k| trial(&hypotheses[k].session, &noise));
     let mut tried: Vec<(f64, Hypothesis)> =
         found.into_iter().zip(hypotheses).filter_map(|(found, hypothesis)| Some((found?.rms_mm, hypothesis))).collect();
     // Readings that are scaled leave a residual that is scaled with them: compare shares of the spread.
@@ -109,7 +106,7 @@ pub(super) fn suggestions(problem: &Problem) -> Vec<Suggestion> {
         .map(|(_, hypothesis)| Suggestion {
             kind: hypothesis.kind,
             subject: hypothesis.subject,
-            rms_um: trial(&with_targets(&hypothesis.session), &noise).map_or(0.0, |found| found.rms_mm * 1e3),
+            rms_um: trial(&hypothesis.session, &noise).map_or(0.0, |found| found.rms_mm * 1e3),
             words: hypothesis.words,
         })
         .collect()

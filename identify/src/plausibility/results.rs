@@ -31,7 +31,8 @@ pub enum ConflictKind {
     ExplainedVariance,
     /// The model leaves too much of the measured orientations.
     Orientations,
-    /// A location error is more than 5 % of its link, beyond its expanded uncertainty.
+    /// An axis lies more than 5 % of its link beside its place, or is tilted by more than 0.05 rad, against the axis before it,
+    /// beyond the expanded uncertainty.
     LocationError,
     /// The zero angle of a joint is more than 10°, beyond its expanded uncertainty.
     ZeroAngle,

@@ -163,8 +163,9 @@ fn commanded(machine: &Machine, state: &[AxisPosition<f64>]) -> Matrix3<f64> {
     Matrix3::from_columns(&[column(0), column(1), column(2)])
 }
 
-/// Quaternions are written with the scalar first or last.
-const QUATERNIONS: [Misreading; 2] = [
+/// Quaternions are written with the scalar first or last, poses and rotations in either direction, and three angles by many
+/// conventions.
+const MISREADINGS: [Misreading; 9] = [
     Misreading {
         columns: "qx, qy, qz, qw",
         words: "the quaternions have the scalar first: their columns are qw, qx, qy, qz in this order",
@@ -175,7 +176,56 @@ const QUATERNIONS: [Misreading; 2] = [
         words: "the quaternions have the scalar last: their columns are qx, qy, qz, qw in this order",
         reread: |values| reordered(values, [3, 0, 1, 2]),
     },
+    Misreading {
+        columns: "the pose",
+        words: "the poses are the inverse ones: of the instrument in the frame of the body, not of the body in that of the \
+                instrument",
+        reread: |values| {
+            let inverse = observed(values).inverse();
+            let place = -(inverse * Vector3::from_column_slice(&values[..3]));
+            values[..3].copy_from_slice(place.as_slice());
+            values[OF_ROTATION].copy_from_slice(inverse.scaled_axis().as_slice());
+        },
+    },
+    Misreading {
+        columns: "the rotation",
+        words: "the rotations are the inverse ones",
+        reread: |values| values[OF_ROTATION].iter_mut().for_each(|value| *value = -*value),
+    },
+    Misreading {
+        columns: "rx, ry, rz",
+        words: "rx, ry, rz are roll, pitch and yaw about fixed axes X, Y, Z, not a rotation vector",
+        reread: |values| turned(values, |[x, y, z]| [(2, z), (1, y), (0, x)]),
+    },
+    Misreading {
+        columns: "rx, ry, rz",
+        words: "rx, ry, rz are angles about X, Y, Z as they turn, not a rotation vector",
+        reread: |values| turned(values, |[x, y, z]| [(0, x), (1, y), (2, z)]),
+    },
+    Misreading {
+        columns: "rx, ry, rz",
+        words: "rx, ry, rz are the angles A, B, C about Z, Y, X as they turn, not a rotation vector",
+        reread: |values| turned(values, |[a, b, c]| [(2, a), (1, b), (0, c)]),
+    },
+    Misreading {
+        columns: "rx, ry, rz",
+        words: "rx, ry, rz are in radians, not in degrees",
+        reread: |values| values[OF_ROTATION].iter_mut().for_each(|value| *value = value.to_degrees()),
+    },
+    Misreading {
+        columns: "rx, ry, rz",
+        words: "rx, ry, rz are in degrees, not in radians",
+        reread: |values| values[OF_ROTATION].iter_mut().for_each(|value| *value = value.to_radians()),
+    },
 ];
+
+/// Replaces three values by the rotation vector of a product of turns: each an axis and an angle, the first one leftmost.
+fn turned(values: &mut [f64], turns: fn([f64; 3]) -> [(usize, f64); 3]) {
+    let [x, y, z] = std::array::from_fn(|k| values[OF_ROTATION.start + k]);
+    let about = |(axis, angle): (usize, f64)| UnitQuaternion::from_scaled_axis(Vector3::ith(axis, angle));
+    let product = turns([x, y, z]).map(about).into_iter().fold(UnitQuaternion::identity(), |product, turn| product * turn);
+    values[OF_ROTATION].copy_from_slice(product.scaled_axis().as_slice());
+}
 
 /// Replaces an orientation by that of the quaternion whose x, y, z, w are these of the x, y, z, w that were read.
 fn reordered(values: &mut [f64], order: [usize; 4]) {
@@ -272,7 +322,7 @@ impl Instrument for Pose<f64> {
         [0, 4, 5].into_iter().for_each(|place| values[place] = -values[place]);
     }
     fn misreadings(&self) -> &'static [Misreading] {
-        &QUATERNIONS
+        &MISREADINGS
     }
     fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
         let by_quaternion = (0..4).any(|component| has(Quantity::Quaternion(component)));

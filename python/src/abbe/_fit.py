@@ -60,9 +60,11 @@ class Fit(Shown, FitResult):
     ``fit["EX0C"]`` is the estimate of a parameter.
     """
 
-    def __init__(self, session: Session, seed: int, source: dict[str, Any] | None = None) -> None:
+    def __init__(
+        self, session: Session, seed: int, allow_implausible: bool, source: dict[str, Any] | None = None
+    ) -> None:
         self._session = session
-        self._seed = seed
+        self._options = (seed, allow_implausible)
         self._known: _abbe.Fit | None = None
         FitResult.__init__(self, json.loads(self._handle.json()) if source is None else source)
 
@@ -70,11 +72,11 @@ class Fit(Shown, FitResult):
     def _handle(self) -> _abbe.Fit:
         # A fit from another process is repeated when an array or a figure is needed: it is deterministic.
         if self._known is None:
-            self._known = _abbe.Fit.of(self._session._handle, self._seed)
+            self._known = _abbe.Fit.of(self._session._handle, *self._options)
         return self._known
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return (Fit, (self._session, self._seed, dict(self._source)))
+        return (Fit, (self._session, *self._options, dict(self._source)))
 
     def __getitem__(self, id: str) -> ParameterResult:
         return parameter(self.parameters, id)

@@ -281,15 +281,17 @@ class Session(Predicting):
         given = [(name, *quantity(name, value)) for name, value in (values or {}).items()]
         return Session._of(self._handle.simulate(given, seed, noise_um, noise_arcsec, draw_setups)[0])
 
-    def fit(self, *, seed: int = 1) -> Fit:
+    def fit(self, *, seed: int = 1, allow_implausible: bool = False) -> Fit:
         """Estimate the parameters from the readings, as ``abbe fit``.
 
         Parameters
         ----------
         seed : int
             Seed of the folds of cross-validation.
+        allow_implausible : bool
+            Accept estimates that mean nothing, though another reading of the file explains them.
         """
-        return Fit(self, seed)
+        return Fit(self, seed, allow_implausible)
 
     def trace(
         self,
@@ -300,6 +302,7 @@ class Session(Predicting):
         exclude: Sequence[str] = (),
         time_limit: float | None = None,
         seed: int = 1,
+        allow_implausible: bool = False,
     ) -> Trace:
         """Find the unmodelled effect behind the residual, as ``abbe trace``.
 
@@ -319,8 +322,11 @@ class Session(Predicting):
             Seconds after which the trace ends with the effects found so far; its verdict is then ``incomplete``.
         seed : int
             Seed of the folds and the null distribution.
+        allow_implausible : bool
+            Accept estimates that mean nothing, though another reading of the file explains them.
         """
-        return Trace(self, progress, max_effects, texts("only", only), texts("exclude", exclude), time_limit, seed)
+        filters = texts("only", only), texts("exclude", exclude)
+        return Trace(self, progress, max_effects, *filters, time_limit, seed, allow_implausible)
 
     def plan(self, *, noise_um: float | None = None, planned: bool = False, effects: bool = True) -> Plan:
         """Analyse identifiability and predicted uncertainty of the tests, as ``abbe plan``.

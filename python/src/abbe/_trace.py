@@ -31,10 +31,11 @@ class Trace(Shown, TraceResult):
         exclude: list[str],
         time_limit: float | None,
         seed: int,
+        allow_implausible: bool,
         source: dict[str, Any] | None = None,
     ) -> None:
         self._session = session
-        self._options = (max_effects, only, exclude, time_limit, seed)
+        self._options = (max_effects, only, exclude, time_limit, seed, allow_implausible)
         self._known = None if source is not None else _abbe.Trace.of(session._handle, progress, *self._options)
         TraceResult.__init__(self, json.loads(self._handle.json()) if source is None else source)
 
