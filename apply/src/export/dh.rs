@@ -128,8 +128,10 @@ impl DhTables {
 
 /// Step of a difference, mm and rad.
 const STEP: f64 = 1e-5;
-/// Change along a direction that the readings do not determine, mm and degrees, above which a parameter is not determined.
-const UNDETERMINED: f64 = 1e-6;
+/// Change along a direction that the readings do not determine, mm and degrees for one physical size (1 mm, 0.01 rad), above
+/// which a parameter is not determined. One that does not change at the nominal machine changes by the size of the errors,
+/// some 10⁻³ of this size.
+const UNDETERMINED: f64 = 0.05;
 /// Largest distance between an axis of the maker's table and of the machine, mm; and of their directions.
 const SAME_MM: f64 = 1e-3;
 const SAME_DIRECTION: f64 = 1e-6;
@@ -183,7 +185,9 @@ pub fn tables(
             errors[slot] += by;
             of_errors(&errors).map(|(_, values)| DVector::from_vec(values))
         };
-        columns.push((index, (moved(STEP)? - moved(-STEP)?) / (2.0 * STEP)));
+        // Angles near ±180° differ by a turn.
+        let change = (moved(STEP)? - moved(-STEP)?).map(|change| change - 360.0 * (change / 360.0).round());
+        columns.push((index, change / (2.0 * STEP)));
     }
     let count = 5 * names.len();
     let jacobian = DMatrix::from_fn(count, columns.len(), |i, j| columns[j].1[i]);

@@ -1,8 +1,8 @@
 //! The frames of a calibrated chain that lie nearest to nominal Denavit–Hartenberg frames.
 //!
 //! The frame `H_k` has its Z on axis `k` and its X on the common normal to the next axis, with the sign of the nominal one. Where
-//! the two axes are nearly parallel, its origin is the point of the axis nearest to the nominal origin, and its X leads to the
-//! next axis in the plane across Z (Hayati).
+//! the two axes are nearly parallel, its origin keeps the nominal `d` from the frame before it, so that it does not depend on
+//! where the base is, and its X leads to the next axis in the plane across Z (Hayati).
 
 use abbe_files::robot::dh::{Convention, Table};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -80,41 +80,63 @@ impl Frames {
 /// `Tx(a)·Rx(α)·Ry(β)` from a frame to the axis of the next one, and the pose that it is.
 fn to_next(step: &Isometry3<f64>) -> ([f64; 3], Isometry3<f64>) {
     let (z, origin) = (step.rotation * Vector3::z(), step.translation.vector);
-    let (beta, meeting) = if Vector3::z().cross(&z).norm() >= PARALLEL {
-        (0.0, foot_on_x(origin, z))
-    } else {
-        (z.x.clamp(-1.0, 1.0).asin(), origin - z * (origin.z / z.z))
-    };
+    let meeting = meeting(origin, z);
+    let beta = if is_parallel(z) { z.x.clamp(-1.0, 1.0).asin() } else { 0.0 };
     let alpha = (-z.y).atan2(z.z);
     let turn =
         UnitQuaternion::from_scaled_axis(Vector3::x() * alpha) * UnitQuaternion::from_scaled_axis(Vector3::y() * beta);
     ([meeting.x, alpha, beta], Isometry3::from_parts(Translation3::new(meeting.x, 0.0, 0.0), turn))
 }
 
+fn is_parallel(z: Vector3<f64>) -> bool {
+    Vector3::z().cross(&z).norm() < PARALLEL
+}
+
+/// Where an axis meets the X axis of the frame before it, both in this frame; of a nearly parallel one, where it meets the
+/// plane across Z.
+fn meeting(point: Vector3<f64>, z: Vector3<f64>) -> Vector3<f64> {
+    if is_parallel(z) { point - z * (point.z / z.z) } else { foot_on_x(point, z) }
+}
+
+/// The point of an axis at the length `d` from where it meets the frame before it, in R.
+fn along(before: &Isometry3<f64>, point: Vector3<f64>, z: Vector3<f64>, d: f64) -> Vector3<f64> {
+    let own = before.inverse();
+    let (local, turned) = (own.transform_point(&point.into()).coords, own.rotation * z);
+    before.transform_point(&(meeting(local, turned) + turned * d).into()).coords
+}
+
 /// The frames of these axes (point and direction in R at zero) and this end near the nominal ones.
 pub(super) fn near(nominal: &Frames, lines: &[(Vector3<f64>, Vector3<f64>)], end: &Isometry3<f64>) -> Frames {
     let count = lines.len();
-    let own: Vec<Isometry3<f64>> = (0..count)
-        .map(|k| {
-            let (point, z) = (lines[k].0, lines[k].1.normalize());
-            let there = &nominal.own[k];
-            let usual = there.rotation * Vector3::x();
-            let Some((next, next_z)) = lines.get(k + 1).map(|(next, z)| (*next, z.normalize())) else {
-                // The frame that the tool is fixed to, on the axis.
-                let fixed = end * (about_x(nominal.last) * nominal.tool).inverse();
-                return pose(nearest(point, z, fixed.translation.vector), fixed.rotation * Vector3::x(), z);
-            };
-            let normal = z.cross(&next_z);
-            if normal.norm() >= PARALLEL {
-                let sign = if normal.dot(&usual) < 0.0 { -1.0 } else { 1.0 };
-                return pose(foot(point, z, next, next_z), normal * sign, z);
+    let mut own: Vec<Isometry3<f64>> = Vec::with_capacity(count);
+    for k in 0..count {
+        let (point, z) = (lines[k].0, lines[k].1.normalize());
+        let there = &nominal.own[k];
+        let usual = there.rotation * Vector3::x();
+        let Some((next, next_z)) = lines.get(k + 1).map(|(next, z)| (*next, z.normalize())) else {
+            // The frame that the tool is fixed to, on the axis.
+            let fixed = end * (about_x(nominal.last) * nominal.tool).inverse();
+            own.push(pose(nearest(point, z, fixed.translation.vector), fixed.rotation * Vector3::x(), z));
+            break;
+        };
+        let normal = z.cross(&next_z);
+        if normal.norm() >= PARALLEL {
+            let sign = if normal.dot(&usual) < 0.0 { -1.0 } else { 1.0 };
+            own.push(pose(foot(point, z, next, next_z), normal * sign, z));
+            continue;
+        }
+        let origin = match own.last() {
+            None => nearest(point, z, there.translation.vector),
+            Some(before) => {
+                let (nominal_z, origin) = (there.rotation * Vector3::z(), there.translation.vector);
+                let d = (origin - along(&nominal.own[k - 1], origin, nominal_z, 0.0)).dot(&nominal_z);
+                along(before, point, z, d)
             }
-            let origin = nearest(point, z, there.translation.vector);
-            let to = next + next_z * ((origin - next).dot(&z) / next_z.dot(&z)) - origin;
-            let sign = if to.dot(&usual) < 0.0 { -1.0 } else { 1.0 };
-            pose(origin, if to.norm() > SHORT_MM { to * sign } else { usual }, z)
-        })
-        .collect();
+        };
+        let to = next + next_z * ((origin - next).dot(&z) / next_z.dot(&z)) - origin;
+        let sign = if to.dot(&usual) < 0.0 { -1.0 } else { 1.0 };
+        own.push(pose(origin, if to.norm() > SHORT_MM { to * sign } else { usual }, z));
+    }
     // The least displacement of the nominal first axis onto the calibrated one is the base's.
     let first = nominal.base * about_x(nominal.first);
     let (old, z) = (first.rotation * Vector3::z(), lines[0].1.normalize());
