@@ -23,8 +23,9 @@ use crate::plausibility::Plausibility;
 use crate::problem::Problem;
 use crate::results::validation::{MovedParameter, ValidationResult, ValidationVerdict};
 use crate::results::{
-    AxisCorrection, Covariance, DeterminedBy, FitResult, GoodStatement, Goodness, GoodnessVerdict, LineQuantity,
-    MeasureStatement, NextStep, ParameterResult, Statements, TraceResult, ValidationStatement,
+    AxisCorrection, Covariance, DeterminedBy, Finding, FitResult, GoodStatement, Goodness, GoodnessVerdict,
+    LineQuantity, MeasureStatement, NextStep, ParameterResult, Statements, TraceResult, Unobservable,
+    ValidationStatement,
 };
 use crate::tolerance::Conformity;
 use crate::tolerance::rule::Decision;
@@ -43,13 +44,18 @@ impl Statements {
             Some(step) => step,
             None if !has_candidates(problem) => NextStep::Nothing,
             None if result.unobservable.is_empty() => NextStep::Improve,
+            None if is_exhausted(problem, &result.unobservable) => NextStep::AllDetermined,
             None => NextStep::Identify,
+        };
+        let measure = MeasureStatement {
+            description: (measure == NextStep::AllDetermined).then(|| format!("rank {0} of {0}", result.rank)),
+            ..measure.into()
         };
         Statements {
             good: good(goodness, result.conformity.as_ref()),
             further: further(problem, &result.parameters),
             correct: corrections(&problem.session.machine, &result.parameters, &result.covariance),
-            measure: measure.into(),
+            measure,
         }
     }
 
@@ -113,6 +119,18 @@ pub fn has_candidates(problem: &Problem) -> bool {
             Contact::None => true,
             Contact::InR(_) => false,
             _ => has_rotary,
+        })
+}
+
+/// Whether any number of further poses of the same set-up would leave the same combinations: all are structural, and random
+/// poses over the travel of every axis have no fewer.
+fn is_exhausted(problem: &Problem, unobservable: &[Unobservable]) -> bool {
+    unobservable.iter().all(|combination| combination.finding == Finding::Structural)
+        && problem.at_random_poses().is_some_and(|anywhere| {
+            let nominal = vec![0.0; anywhere.parameters.list.len()];
+            let whole = anywhere.triangles(&nominal).map(|own| anywhere.prior_triangle(&nominal).merged(&own));
+            let rank = whole.and_then(|whole| anywhere.parameters.rank(&whole));
+            rank.is_ok_and(|rank| rank.null_space.ncols() >= unobservable.len())
         })
 }
 

@@ -82,7 +82,7 @@ fn correct(statements: &Statements) -> String {
     };
     if large.is_empty() && statements.further.is_empty() {
         return match statements.correct.is_empty() {
-            true => "What to correct: no location error is identified".to_string(),
+            true => "What to correct: no location error is determined alone, only combinations of them".to_string(),
             false => "What to correct: nothing; no axis deviates by more than the uncertainty".to_string(),
         };
     }
@@ -144,6 +144,10 @@ fn measure(statement: &MeasureStatement, machine: Option<&Machine>, commands: &C
         }
         NextStep::Identify => plan(IDENTIFIES),
         NextStep::Improve => plan(IMPROVES),
+        NextStep::AllDetermined => {
+            let rank = statement.description.as_deref().unwrap_or_default();
+            one(&format!("nothing new; all that this instrument can determine is determined ({rank})"))
+        }
         NextStep::Nothing => one("no candidate test is known for this instrument"),
         NextStep::Refit => one(&format!("nothing before {}, which identifies the machine anew", command("trace", ""))),
         NextStep::WidenRange => one("a session that covers the range of these readings"),

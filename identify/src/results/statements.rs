@@ -89,6 +89,8 @@ pub enum NextStep {
     Repeat,
     /// Measure at the date of the next check.
     NextCheck,
+    /// Nothing: all that the instrument can determine of the machine is determined.
+    AllDetermined,
     /// Nothing: no candidate test is known for the instrument.
     Nothing,
 }

@@ -33,6 +33,8 @@ use crate::improve::NamedUncertainty;
 use crate::states;
 use abbe_identify::noise::{Noise, NoiseSource};
 use abbe_identify::numerics::median;
+use abbe_identify::numerics::rank::Rank;
+use abbe_identify::numerics::tolerances::MIN_IDENTIFIABLE;
 use abbe_identify::numerics::triangle::Triangle;
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::{Problem, RowBlock};
@@ -60,6 +62,10 @@ pub struct PoseOptions {
 /// The prior of every parameter, in physical sizes. It makes the covariance of few poses exist, and has a share of at most
 /// 10⁻⁶ in that of poses of full rank.
 const RIDGE_SIZES: f64 = 1e3;
+/// Factor by which the least singular value of an estimated combination grows until the chosen poses determine all, and its
+/// largest value.
+const LEAST_STEP: f64 = 3.0;
+const MAX_LEAST: f64 = 100.0;
 /// Number of random sets with which the selection is compared.
 const RANDOM_SETS: usize = 100;
 /// Streams of the generator.
@@ -147,33 +153,32 @@ pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Resu
     let mut average = problem.clone();
     average.noise.sigma_mm *= (candidates.len() as f64 / options.poses as f64).sqrt();
     let information = Triangle::new(list.len()).merged(&average.triangles(&nominal)?);
-    let rank = problem.parameters.rank(&information.merged([&problem.prior_triangle(&nominal)]))?;
-    let kept: Vec<usize> = (0..list.len()).filter(|j| !rank.pivots.contains(j)).collect();
-    let targets: Vec<usize> = (0..kept.len()).filter(|k| list[kept[*k]].role != Role::Setup).collect();
-    if targets.is_empty() {
-        return Err(IdentifyError::NoUnknowns.into());
-    }
-    let of_targets: Vec<usize> = targets.iter().map(|k| kept[*k]).collect();
-    let others: Vec<usize> = kept.iter().filter(|j| !of_targets.contains(j)).copied().collect();
-    let shared = SharedParameters::of(&problem, &others, &of_targets);
-    let columns = [others, of_targets.clone()].concat();
+    let information = information.merged([&problem.prior_triangle(&nominal)]);
     let prior = problem.prior_triangle(&nominal).r();
-    let prior = Mat::from_fn(prior.nrows(), columns.len(), |i, k| prior[(i, columns[k])]);
-    let rows = whitened(&problem, &columns)?;
-    let base = shared.regularised(prior.as_ref(), RIDGE_SIZES);
-    let views = rows.iter().map(|rows| rows.as_ref()).collect();
-    let design = Design { shared: &shared, base: &base, rows: views, goal: &options.goal, repeats: false };
-    let ranked = Ranked { shared: &shared, rows: &rows, prior: &prior };
-    let chosen = design.run(options.poses);
-    let [rank_of_chosen, involved] = ranked.rank(&chosen)?;
-    if rank_of_chosen < involved {
+    let mut least = MIN_IDENTIFIABLE;
+    let Chosen { rank, shared, of_targets, base, rows, prior, poses: chosen } = loop {
+        let rank = problem.parameters.rank_above(&information, (least, 0))?;
+        let found = chosen_with(&problem, rank, &prior, options)?;
+        let ranked = Ranked { shared: &found.shared, rows: &found.rows, prior: &found.prior };
+        let [rank_of_chosen, involved] = ranked.rank(&found.poses)?;
+        if rank_of_chosen == involved {
+            break found;
+        }
+        // With enough readings, more poses do not help: the layout itself hardly determines a combination.
+        if options.poses * problem.channels(0) >= involved && least < MAX_LEAST {
+            least *= LEAST_STEP;
+            continue;
+        }
         let lacking = involved - rank_of_chosen;
         let unknowns = counted(involved, "unknown");
         let found =
             format!("the readings of {} have rank {rank_of_chosen} in {unknowns}", counted(options.poses, "pose"));
         let least = options.poses + lacking.div_ceil(problem.channels(0));
         return Err(IdentifyError::not_applicable(asked, found, format!("ask for at least {least} poses")).into());
-    }
+    };
+    let views = rows.iter().map(|rows| rows.as_ref()).collect();
+    let design = Design { shared: &shared, base: &base, rows: views, goal: &options.goal, repeats: false };
+    let ranked = Ranked { shared: &shared, rows: &rows, prior: &prior };
     let mut random = Pcg64::new(u128::from(options.seed), RANDOM_SET_STREAM);
     let value = |poses: &[usize]| options.goal.value(&shared, &design.with(poses));
     let mut values = (0..RANDOM_SETS)
@@ -218,6 +223,43 @@ pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Resu
         ]
         .concat(),
     })
+}
+
+/// Poses that are chosen with some parameters held.
+struct Chosen {
+    /// Its pivots are held.
+    rank: Rank,
+    /// The others, those of interest last.
+    shared: SharedParameters,
+    /// The parameters of interest.
+    of_targets: Vec<usize>,
+    /// Information of the priors.
+    base: Mat<f64>,
+    /// Whitened rows of each candidate.
+    rows: Vec<Mat<f64>>,
+    /// Whitened rows of the priors.
+    prior: Mat<f64>,
+    /// The poses among the candidates.
+    poses: Vec<usize>,
+}
+
+/// Chooses poses with the pivots of a rank held at nominal.
+fn chosen_with(problem: &Problem, rank: Rank, prior: &Mat<f64>, options: &PoseOptions) -> Result<Chosen, PlanError> {
+    let list = &problem.parameters.list;
+    let kept: Vec<usize> = (0..list.len()).filter(|j| !rank.pivots.contains(j)).collect();
+    let (others, of_targets): (Vec<usize>, Vec<usize>) = kept.into_iter().partition(|j| list[*j].role == Role::Setup);
+    if of_targets.is_empty() {
+        return Err(IdentifyError::NoUnknowns.into());
+    }
+    let shared = SharedParameters::of(problem, &others, &of_targets);
+    let columns = [others, of_targets.clone()].concat();
+    let prior = Mat::from_fn(prior.nrows(), columns.len(), |i, k| prior[(i, columns[k])]);
+    let rows = whitened(problem, &columns)?;
+    let base = shared.regularised(prior.as_ref(), RIDGE_SIZES);
+    let views = rows.iter().map(|rows| rows.as_ref()).collect();
+    let poses =
+        Design { shared: &shared, base: &base, rows: views, goal: &options.goal, repeats: false }.run(options.poses);
+    Ok(Chosen { rank, shared, of_targets, base, rows, prior, poses })
 }
 
 /// Copies of tests of a session, with the places of sockets that only their readings tell.
