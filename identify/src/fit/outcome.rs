@@ -8,7 +8,7 @@ use super::{Fit, assume};
 use crate::error::IdentifyError;
 use crate::identifiability::determined_by_prior;
 use crate::linear::{Linearisation, is_of_interest};
-use crate::noise::{NoiseSource, stated_against_repeats};
+use crate::noise::NoiseSource;
 use crate::numerics::rank::Rank;
 use crate::parameters::Role;
 use crate::plausibility::Pulls;
@@ -107,20 +107,26 @@ impl Determined {
     }
 }
 
-/// What a fit is worth.
-pub fn outcome(problem: &Problem, fit: &Fit, goodness: Goodness, determined: &Determined) -> Outcome {
+/// What a fit is worth. `contradicted` says why repeats contradict the stated noise ([`crate::noise::stated_against_repeats`]).
+pub fn outcome(
+    problem: &Problem,
+    fit: &Fit,
+    goodness: Goodness,
+    determined: &Determined,
+    contradicted: Option<String>,
+) -> Outcome {
     Outcome {
         goodness,
         determined_by_prior: determined.by_prior.clone(),
         not_estimated: determined.not_estimated(problem),
-        assumptions: assumptions(problem, fit),
+        assumptions: assumptions(problem, fit, contradicted),
         ranges: ranges(problem),
     }
 }
 
 /// What a fit assumes, each with its test by the readings.
-fn assumptions(problem: &Problem, fit: &Fit) -> Vec<Assumption> {
-    let mut list = vec![noise(problem, fit)];
+fn assumptions(problem: &Problem, fit: &Fit, contradicted: Option<String>) -> Vec<Assumption> {
+    let mut list = vec![noise(problem, contradicted)];
     list.extend(priors(problem, fit));
     let excluded = problem.rejected.iter().flatten().filter(|rejected| **rejected).count();
     if excluded > 0 {
@@ -141,9 +147,8 @@ fn assumptions(problem: &Problem, fit: &Fit) -> Vec<Assumption> {
     list
 }
 
-fn noise(problem: &Problem, fit: &Fit) -> Assumption {
+fn noise(problem: &Problem, contradicted: Option<String>) -> Assumption {
     let figure = format!("noise of {}", problem.unit().text(problem.noise.sigma_mm * 1e3, 3));
-    let contradicted = stated_against_repeats(problem, &fit.residuals);
     let (statement, verdict, test) = match (problem.noise.source, contradicted) {
         (_, Some(why)) => (format!("{figure}, as stated"), AssumptionVerdict::Contradicted, why),
         (NoiseSource::Stated, None) => (

@@ -34,7 +34,8 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
     let mut warnings = problem.session.warnings.clone();
     warnings.extend(plausibility::warnings(&plausibility));
     warnings.extend(plausibility::coefficients::warnings(problem, fit));
-    warnings.extend(noise::stated_against_repeats(problem, &fit.residuals));
+    let contradicted = noise::stated_against_repeats(problem, &fit.residuals);
+    warnings.extend(contradicted.clone());
     warnings.extend(noise::rigid_targets(problem));
     warnings.extend(noise::silent_channels(problem, &fit.residuals, fit.rank.identifiable_basis.ncols()));
     warnings.extend(mislabelled_runs(&problem.tests));
@@ -72,7 +73,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
         null_space: covariance::null_space(problem, &fit.rank),
         outliers: outliers(problem, fit),
         conformity: conformity(&problem.session, &parameters, &circular, noise_um, goodness.verdict),
-        outcome: outcome::outcome(problem, fit, goodness, &determined),
+        outcome: outcome::outcome(problem, fit, goodness, &determined, contradicted),
         circular,
         positioning: positioning::of_session(&problem.session, &problem.rejected),
         largest_of_diagonals: diagonal::largest(&diagonals),

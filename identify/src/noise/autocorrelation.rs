@@ -1,36 +1,16 @@
 //! Autocorrelation of the noise along runs, from the deviations of repeats.
 //!
-//! Removing a trend from every run removes slow noise too: with a coefficient of 0.8 and a hundred readings per run, more
-//! than half of its slow part. The autoregression is therefore estimated from what the trend leaves. For `n` deviations
-//! `d` of a run without the orthonormal terms `Q` of its trend, the restricted likelihood is (Harville, J. Am. Stat. Assoc.
-//! 72 (1977) 320)
-//!
-//! ```text
-//! −2 ln L = m ln σ² + ln |R| + ln |QᵀR⁻¹Q| + dᵀPd/σ²,   m = n − rank Q,
-//! P = R⁻¹ − R⁻¹Q (QᵀR⁻¹Q)⁻¹ QᵀR⁻¹
-//! ```
-//!
-//! with the autocorrelations `R` of the process. They follow from its partial autocorrelations `κ`, each between −1 and 1:
-//! the recursion of Durbin and Levinson gives the prediction of each reading from those before, and thus the `W` of
-//! `R⁻¹ = WᵀW`. In short runs the likelihood is flat towards a random walk, so `κ₁` is the mean of its posterior with a
-//! uniform prior. Its maximum would often lie at the bound.
-
-use std::collections::HashMap;
-use std::collections::hash_map::Entry;
-use std::ops::Range;
+//! The likelihood of an autoregression is that of deviations without the trend of their run ([`super::restricted`]). Its
+//! partial autocorrelations `κ` lie between −1 and 1. In short runs the likelihood is flat towards a random walk, so `κ₁` is
+//! the mean of its posterior with a uniform prior. Its maximum would often lie at the bound.
 
 use abbe_model::session::Test;
-use nalgebra::{SMatrix, SVector};
 
 use super::PureError;
-use super::trends::{TERMS, Trends, orthonormalise};
+use super::restricted::{DetrendedRuns, MAX_ORDER, Predictions};
 use crate::numerics::golden_section::highest;
 use crate::problem::Problem;
 
-/// Maximum autoregressive order.
-const MAX_ORDER: usize = 3;
-/// Least number of pairs of deviations at the largest lag.
-const MIN_PAIRS: usize = 50;
 /// The largest partial autocorrelation.
 const MAX_PARTIAL: f64 = 0.98;
 /// Decrease of −2 ln L that the first coefficient needs, and by which repeats contradict a stated standard deviation: 1 %.
@@ -88,9 +68,9 @@ impl PureError {
         &self,
         stated_mm: Option<f64>,
         tests: &[Test],
-        kept: impl Fn(usize, usize) -> bool,
+        kept: impl Fn(usize, usize) -> bool + Sync,
     ) -> Option<Autocorrelation> {
-        let runs = DetrendedRuns::of(self, tests, kept)?;
+        let runs = DetrendedRuns::of(self, tests, kept, MAX_ORDER)?;
         Some(runs.autocorrelation(&runs.estimate(MAX_ORDER, stated_mm)))
     }
 
@@ -100,9 +80,9 @@ impl PureError {
         &self,
         stated_mm: Option<f64>,
         tests: &[Test],
-        kept: impl Fn(usize, usize) -> bool,
+        kept: impl Fn(usize, usize) -> bool + Sync,
     ) -> Option<Vec<Process>> {
-        let runs = DetrendedRuns::of(self, tests, kept)?;
+        let runs = DetrendedRuns::of(self, tests, kept, MAX_ORDER)?;
         Some(runs.possible_processes(&runs.estimate(MAX_ORDER, stated_mm)))
     }
 
@@ -110,72 +90,14 @@ impl PureError {
     pub(super) fn coefficients_of_first_order(
         &self,
         tests: &[Test],
-        kept: impl Fn(usize, usize) -> bool,
+        kept: impl Fn(usize, usize) -> bool + Sync,
     ) -> Option<Vec<f64>> {
-        let runs = DetrendedRuns::of(self, tests, kept)?;
+        let runs = DetrendedRuns::of(self, tests, kept, 1)?;
         Some(runs.autocorrelation(&runs.estimate(1, None)).process.coefficients)
     }
 }
 
-/// The deviations of repeats along runs.
-struct DetrendedRuns {
-    alike: Vec<AlikeRuns>,
-}
-
-/// Runs of one test with deviations at the same places.
-struct AlikeRuns {
-    /// The places of uninterrupted deviations.
-    stretches: Vec<Range<usize>>,
-    /// The orthonormal terms of the trend at each place; zero for missing terms.
-    trend: Vec<[f64; TERMS]>,
-    /// The deviations of each run, mm. Those of white noise have its variance, less that of the trend.
-    runs: Vec<Vec<f64>>,
-    /// Share of independent deviations: two repeats hold the same deviation twice.
-    independent: f64,
-}
-
 impl DetrendedRuns {
-    /// `None` without enough pairs of deviations, and for readings of several channels.
-    fn of(pure: &PureError, tests: &[Test], kept: impl Fn(usize, usize) -> bool) -> Option<DetrendedRuns> {
-        let (mut alike, mut pairs) = (Vec::new(), 0);
-        for (number, test) in tests.iter().enumerate() {
-            let readings = test.readings.as_ref()?;
-            if readings.channels != 1 {
-                return None;
-            }
-            let trends = Trends::of(readings, |row| kept(number, row));
-            let deviation = |row: usize| pure.deviations[number][row].filter(|_| kept(number, row)).unwrap_or(f64::NAN);
-            let mut whole_runs: HashMap<usize, usize> = HashMap::new();
-            let first_of_test = alike.len();
-            for run in readings.runs() {
-                let known: Vec<usize> = run.clone().filter(|row| !deviation(*row).is_nan()).collect();
-                let values = known.iter().map(|row| deviation(*row) / pure.rescaling(number)).collect();
-                let stretches = stretches(&known);
-                pairs += stretches.iter().map(|stretch| stretch.len().saturating_sub(MAX_ORDER)).sum::<usize>();
-                let place = match whole_runs.entry(run.len()) {
-                    Entry::Occupied(entry) if known.len() == run.len() => *entry.get(),
-                    entry => {
-                        let mut trend: Vec<[f64; TERMS]> = known.iter().map(|row| trends.terms_at(*row)).collect();
-                        orthonormalise(&mut trend);
-                        alike.push(AlikeRuns { stretches, trend, runs: Vec::new(), independent: 1.0 });
-                        if known.len() == run.len() {
-                            entry.insert_entry(alike.len() - 1);
-                        }
-                        alike.len() - 1
-                    }
-                };
-                alike[place].runs.push(values);
-            }
-            let of_test = &mut alike[first_of_test..];
-            let freedom: f64 = of_test.iter().map(|alike| alike.freedom_of_run() * alike.runs.len() as f64).sum();
-            let independent = (pure.freedom_of_tests[number] / freedom.max(f64::MIN_POSITIVE)).min(1.0);
-            of_test.iter_mut().for_each(|alike| alike.independent = independent);
-        }
-        alike.retain(|alike| alike.freedom_of_run() > 0.5 && alike.independent > 0.0);
-        let is_constant = alike.iter().flat_map(|alike| alike.runs.iter().flatten()).all(|value| *value == 0.0);
-        (pairs >= MIN_PAIRS && !is_constant).then_some(DetrendedRuns { alike })
-    }
-
     /// The partial autocorrelations with the greatest likelihood, up to the last significant order.
     fn estimate(&self, most: usize, stated_mm: Option<f64>) -> Estimate {
         let free = self.best(&[0.0], 0, None);
@@ -290,22 +212,6 @@ impl DetrendedRuns {
         let innovation_mm = sigma_mm * predictions.variances[partials.len()].sqrt();
         Process { coefficients: predictions.coefficients().to_vec(), sigma_mm, innovation_mm }
     }
-
-    /// The restricted likelihood of partial autocorrelations, with the stated or else the best standard deviation.
-    fn fit(&self, partials: &[f64], stated_mm: Option<f64>) -> RestrictedFit {
-        let predictions = Predictions::of(partials);
-        let (mut freedom, mut ln_determinants, mut squares) = (0.0, 0.0, 0.0);
-        for alike in &self.alike {
-            let of_runs = alike.fit(&predictions);
-            let count = alike.independent * alike.runs.len() as f64;
-            freedom += count * alike.freedom_of_run();
-            ln_determinants += count * of_runs.ln_determinant;
-            squares += alike.independent * of_runs.squares;
-        }
-        let variance = stated_mm.map_or(squares / freedom, |sigma_mm| sigma_mm * sigma_mm);
-        let minus_two_ln = freedom * variance.ln() + ln_determinants + squares / variance;
-        RestrictedFit { minus_two_ln, sigma_mm: variance.sqrt() }
-    }
 }
 
 /// What the likelihood shows.
@@ -344,108 +250,6 @@ impl Posterior {
     }
 }
 
-struct RestrictedFit {
-    minus_two_ln: f64,
-    sigma_mm: f64,
-}
-
-/// `ln |R| + ln |QᵀR⁻¹Q|` of one run, and `dᵀPd` summed over runs, mm².
-struct FitOfRuns {
-    ln_determinant: f64,
-    squares: f64,
-}
-
-impl AlikeRuns {
-    /// Degrees of freedom of one run beside its trend.
-    fn freedom_of_run(&self) -> f64 {
-        self.trend.len() as f64 - self.trend.iter().flatten().map(|q| q * q).sum::<f64>()
-    }
-
-    /// Whether the trend lacks a term.
-    fn is_missing(&self, term: usize) -> bool {
-        self.trend.iter().all(|q| q[term] == 0.0)
-    }
-
-    fn fit(&self, predictions: &Predictions) -> FitOfRuns {
-        let orders = || self.stretches.iter().flat_map(|stretch| 0..stretch.len());
-        let mut ln_determinant: f64 = orders().map(|past| predictions.variance(past).ln()).sum();
-        let trend: Vec<SVector<f64, TERMS>> = predictions.whitened(&self.stretches, |i| SVector::from(self.trend[i]));
-        let mut products: SMatrix<f64, TERMS, TERMS> = trend.iter().map(|q| q * q.transpose()).sum();
-        // A missing term has no part in the determinant.
-        for i in (0..TERMS).filter(|i| self.is_missing(*i)) {
-            products[(i, i)] = 1.0;
-        }
-        let factor = products.cholesky();
-        ln_determinant += factor.as_ref().map_or(0.0, |factor| factor.ln_determinant());
-        let squares_of = |run: &Vec<f64>| {
-            let white: Vec<SVector<f64, 1>> = predictions.whitened(&self.stretches, |i| SVector::from([run[i]]));
-            let along: SVector<f64, TERMS> = white.iter().zip(&trend).map(|(value, q)| q * value[0]).sum();
-            let of_trend = factor.as_ref().map_or(0.0, |factor| along.dot(&factor.solve(&along)));
-            white.iter().map(|value| value[0] * value[0]).sum::<f64>() - of_trend
-        };
-        FitOfRuns { ln_determinant, squares: self.runs.iter().map(squares_of).sum() }
-    }
-}
-
-/// The predictions of a value of a process of unit variance from values before it.
-struct Predictions {
-    /// For each number of values before it, up to the order: their coefficients, the last value first.
-    coefficients: Vec<Vec<f64>>,
-    /// For each number of values before it: the variance that these leave.
-    variances: Vec<f64>,
-}
-
-impl Predictions {
-    /// From partial autocorrelations, by the recursion of Durbin and Levinson.
-    fn of(partials: &[f64]) -> Predictions {
-        let mut predictions = Predictions { coefficients: vec![Vec::new()], variances: vec![1.0] };
-        for (order, partial) in partials.iter().enumerate() {
-            let last = &predictions.coefficients[order];
-            let mut next: Vec<f64> = (0..order).map(|k| last[k] - partial * last[order - 1 - k]).collect();
-            next.push(*partial);
-            predictions.variances.push(predictions.variances[order] * (1.0 - partial * partial));
-            predictions.coefficients.push(next);
-        }
-        predictions
-    }
-
-    /// The coefficients of the process.
-    fn coefficients(&self) -> &[f64] {
-        &self.coefficients[self.coefficients.len() - 1]
-    }
-
-    fn variance(&self, past: usize) -> f64 {
-        self.variances[past.min(self.variances.len() - 1)]
-    }
-
-    /// `W v` for values in stretches: what their past does not predict, of unit variance.
-    fn whitened<const N: usize>(
-        &self,
-        stretches: &[Range<usize>],
-        value: impl Fn(usize) -> SVector<f64, N>,
-    ) -> Vec<SVector<f64, N>> {
-        let values = stretches.iter().flat_map(|stretch| stretch.clone().map(move |i| (i, i - stretch.start)));
-        let whitened = |(i, past): (usize, usize)| {
-            let coefficients = &self.coefficients[past.min(self.coefficients.len() - 1)];
-            let predicted: SVector<f64, N> =
-                coefficients.iter().enumerate().map(|(lag, a)| value(i - lag - 1) * *a).sum();
-            (value(i) - predicted) / self.variance(past).sqrt()
-        };
-        values.map(whitened).collect()
-    }
-}
-
-/// The places of uninterrupted rows.
-fn stretches(rows: &[usize]) -> Vec<Range<usize>> {
-    let mut stretches = Vec::new();
-    let mut start = 0;
-    for uninterrupted in rows.chunk_by(|a, b| a + 1 == *b) {
-        stretches.push(start..start + uninterrupted.len());
-        start += uninterrupted.len();
-    }
-    stretches
-}
-
 /// Factor on the variance of a mean if neighbouring values are correlated: `(1 + r)/(1 − r)`. `r` is the sum of the
 /// products of neighbours over the sum of their squares, from 0 to `most`.
 pub(crate) fn enlargement_of_mean(products: f64, squares: f64, most: f64) -> f64 {
@@ -460,81 +264,7 @@ mod tests {
     use rand_pcg::Pcg64;
 
     use super::*;
-    use crate::noise::trends::trend_terms;
-
-    /// Autocorrelations by their recursion: `ρ₁ = a₁/(1 − a₂)`, then `ρ_k = a₁ ρ_{k−1} + a₂ ρ_{k−2}`.
-    fn correlations(a: [f64; 2], count: usize) -> Vec<f64> {
-        let mut correlation = vec![1.0, a[0] / (1.0 - a[1])];
-        for k in 2..count {
-            correlation.push(a[0] * correlation[k - 1] + a[1] * correlation[k - 2]);
-        }
-        correlation
-    }
-
-    fn trend(readings: usize) -> Vec<[f64; TERMS]> {
-        trend_terms(&(0..readings).map(|t| t as f64).collect::<Vec<_>>())
-    }
-
-    /// The partial autocorrelations of an autoregression of order two are `ρ₁` and `a₂`.
-    #[test]
-    fn predictions_have_the_coefficients_of_the_process() {
-        for a in [[0.8, 0.0], [1.1, -0.4], [-0.5, 0.3]] {
-            let correlation = correlations(a, 3);
-            let predictions = Predictions::of(&[correlation[1], a[1]]);
-            assert!(predictions.coefficients().iter().zip(a).all(|(found, a)| (found - a).abs() < 1e-12));
-            // The variance that a prediction leaves: 1 − Σ aₖ ρₖ.
-            let left = 1.0 - a[0] * correlation[1] - a[1] * correlation[2];
-            assert!(
-                (predictions.variance(2) - left).abs() < 1e-12 && predictions.variance(7) == predictions.variances[2]
-            );
-        }
-    }
-
-    /// Compares with the likelihood of contrasts: for orthonormal `N` with `NᵀQ = 0`, those of a run are `Nᵀd` and their
-    /// covariance is `σ² NᵀRN`, as explicit matrices.
-    #[test]
-    fn the_restricted_likelihood_is_that_of_contrasts() {
-        let a = [1.1, -0.4];
-        let correlation = correlations(a, 60);
-        let mut generator = Pcg64::seed_from_u64(1);
-        // A run without one reading in its middle, and whole ones.
-        let place = |t: usize, is_whole: bool| if is_whole || t < 11 { t } else { t + 1 };
-        let mut alike = Vec::new();
-        let (mut minus_two_ln, mut freedom) = (0.0, 0.0);
-        for (n, runs, is_whole) in [(30_usize, 2, true), (12, 3, true), (26, 1, false)] {
-            let q = trend(n);
-            let runs: Vec<Vec<f64>> =
-                (0..runs).map(|_| (0..n).map(|_| generator.sample(StandardNormal)).collect()).collect();
-            let r = faer::Mat::from_fn(n, n, |t, s| {
-                let together = is_whole || (t < 11) == (s < 11);
-                if together { correlation[place(t, is_whole).abs_diff(place(s, is_whole))] } else { 0.0 }
-            });
-            // The eigenvectors of 1 − QQᵀ of eigenvalue 1 are contrasts.
-            let terms = faer::Mat::from_fn(n, TERMS, |t, i| q[t][i]);
-            let projector = faer::Mat::<f64>::identity(n, n) - &terms * terms.transpose();
-            let eigen = projector.self_adjoint_eigen(faer::Side::Lower).unwrap();
-            let first = (0..n).find(|i| eigen.S()[*i] > 0.5).unwrap();
-            let contrasts = eigen.U().subcols(first, n - first);
-            let covariance = contrasts.transpose() * r * contrasts;
-            let ln_determinant: f64 =
-                covariance.self_adjoint_eigenvalues(faer::Side::Lower).unwrap().iter().map(|value| value.ln()).sum();
-            let inverse = {
-                use faer::linalg::solvers::DenseSolveCore;
-                covariance.partial_piv_lu().inverse()
-            };
-            for run in &runs {
-                let d = contrasts.transpose() * faer::Mat::from_fn(n, 1, |t, _| run[t]);
-                minus_two_ln += ln_determinant + (d.transpose() * &inverse * &d)[(0, 0)] / 0.49;
-                freedom += (n - first) as f64;
-            }
-            let rows: Vec<usize> = (0..n).map(|t| place(t, is_whole)).collect();
-            alike.push(AlikeRuns { stretches: stretches(&rows), trend: q, runs, independent: 1.0 });
-        }
-        minus_two_ln += freedom * 0.49_f64.ln();
-        let fitted = DetrendedRuns { alike }.fit(&[correlation[1], a[1]], Some(0.7));
-        assert!((fitted.minus_two_ln - minus_two_ln).abs() < 1e-9, "{} {minus_two_ln}", fitted.minus_two_ln);
-        assert_eq!(fitted.sigma_mm, 0.7);
-    }
+    use crate::noise::restricted::tests::correlations;
 
     impl DetrendedRuns {
         fn recovered(&self, stated_mm: Option<f64>) -> Autocorrelation {
@@ -555,13 +285,7 @@ mod tests {
             }
             values.iter().map(|value| sigma * value).collect()
         };
-        let alike = lengths.iter().map(|n| AlikeRuns {
-            stretches: stretches(&(0..*n).collect::<Vec<_>>()),
-            trend: trend(*n),
-            runs: vec![run(*n, generator)],
-            independent: 1.0,
-        });
-        DetrendedRuns { alike: alike.collect() }
+        DetrendedRuns::independent(lengths.iter().map(|n| run(*n, generator)).collect())
     }
 
     /// The coefficients, their uncertainty and the standard deviation, over many draws.
@@ -628,11 +352,5 @@ mod tests {
         // White noise of a third of the stated standard deviation contradicts it.
         let contradicted = drawn(0.0, Some(0.9)).iter().filter(|of| !of.is_as_stated).count();
         assert!(contradicted >= 196, "{contradicted}");
-    }
-
-    #[test]
-    fn gaps_divide_a_run() {
-        assert_eq!(stretches(&[4, 5, 6, 9, 11, 12]), [0..3, 3..4, 4..6]);
-        assert_eq!(stretches(&[]), [0..0; 0]);
     }
 }

@@ -13,6 +13,7 @@
 mod autocorrelation;
 mod flange;
 pub mod outliers;
+mod restricted;
 mod stated;
 pub mod trends;
 mod waves;
@@ -297,7 +298,10 @@ struct RepeatKeys {
 impl RepeatKeys {
     /// Of readings that are compared within their test.
     fn of(readings: &Readings) -> RepeatKeys {
-        let differs = |column: &&Vec<f64>| column.iter().any(|position| key(*position) != key(column[0]));
+        // The comparison of the positions themselves spares most of the rounding.
+        let differs = |column: &&Vec<f64>| {
+            column.iter().any(|position| *position != column[0] && key(*position) != key(column[0]))
+        };
         RepeatKeys::of_axes(readings, readings.positions.iter().filter(differs).collect())
     }
 

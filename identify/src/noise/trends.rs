@@ -114,7 +114,11 @@ impl Trends {
 
     /// The terms of the trend at a row.
     pub fn terms_at(&self, row: usize) -> [f64; TERMS] {
-        self.run(row).map_or([0.0; TERMS], |run| self.terms[self.terms_of_run[run]][row - self.runs[run].start])
+        self.run(row).map_or([0.0; TERMS], |run| self.terms_in(run, row))
+    }
+
+    fn terms_in(&self, run: usize, row: usize) -> [f64; TERMS] {
+        self.terms[self.terms_of_run[run]][row - self.runs[run].start]
     }
 
     /// Residuals without the trend of each run and channel.
@@ -143,7 +147,8 @@ impl Trends {
         // The trends' part of Σ_ts: for each run, the squared norm of the sum of its rows' terms.
         let mut sums: Vec<(Option<usize>, [f64; TERMS])> = Vec::new();
         for row in group {
-            let (run_of_row, terms) = (self.run(*row), self.terms_at(*row));
+            let run_of_row = self.run(*row);
+            let terms = run_of_row.map_or([0.0; TERMS], |run| self.terms_in(run, *row));
             own += terms.iter().map(|q| q * q).sum::<f64>();
             match sums.iter_mut().find(|(run, _)| *run == run_of_row) {
                 Some((_, sum)) => sum.iter_mut().zip(&terms).for_each(|(sum, q)| *sum += q),

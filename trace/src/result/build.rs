@@ -58,6 +58,7 @@ pub(super) fn build(
     let Model { problem, fit, mut figures } = after;
     let Statements { verdict, remainder, residual_before, rejected, candidates, interrupted, .. } = statements;
     let determined = Determined::of(problem, &fit.rank)?;
+    let contradicted = noise::stated_against_repeats(problem, &fit.residuals);
     figures.goodness = figures.goodness.with_structure(remainder.structured);
     determined.mark(problem, &mut figures.parameters, figures.goodness);
     let effects = effects(&figures)?;
@@ -70,7 +71,7 @@ pub(super) fn build(
     let mut result = TraceResult {
         reading_unit: problem.unit(),
         verdict: verdict.gated(figures.goodness.verdict),
-        outcome: outcome::outcome(problem, fit, figures.goodness, &determined),
+        outcome: outcome::outcome(problem, fit, figures.goodness, &determined, contradicted),
         interrupted: false,
         time_limit_s: None,
         unique: effects.iter().all(|effect| effect.unique),
