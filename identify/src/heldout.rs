@@ -109,10 +109,15 @@ fn predicted(problem: &Problem, beta: &[f64], steps: &[Vec<f64>]) -> Result<Vec<
         let mut residual = rows.col(of_test.len()).to_owned();
         let fold_of = &problem.folds.of_row[block.test][block.rows.clone()];
         let channels = problem.channels(block.test);
-        for (parameter, column) in of_test.iter().zip(rows.col_iter()) {
-            for (i, residual) in residual.iter_mut().enumerate() {
-                *residual -= column[i] * steps[fold_of[i / channels]][*parameter];
+        let mut start = 0;
+        for of_fold in fold_of.chunk_by(|a, b| a == b) {
+            let count = of_fold.len() * channels;
+            for (parameter, column) in of_test.iter().zip(rows.col_iter()) {
+                let step = steps[of_fold[0]][*parameter];
+                let own = residual.as_mut().subrows_mut(start, count);
+                own.iter_mut().zip(column.subrows(start, count).iter()).for_each(|(own, d)| *own -= d * step);
             }
+            start += count;
         }
         Ok::<_, IdentifyError>(residual)
     });

@@ -82,7 +82,7 @@ impl Rows for CsvRows {
                 self.quoted(&line.text)?
             } else {
                 let mut cells = std::mem::take(&mut self.spare);
-                fill(&mut cells, line.text.split(char::from(self.separator)).map(str::trim));
+                fill(&mut cells, parts(&line.text, self.separator));
                 cells
             };
             self.lines.count_row()?;
@@ -94,6 +94,21 @@ impl Rows for CsvRows {
     fn reuse(&mut self, row: Row) {
         self.spare = row.cells;
     }
+}
+
+/// The cells of a line without quotes, without surrounding spaces.
+fn parts(text: &str, separator: u8) -> impl Iterator<Item = &str> {
+    let mut rest = Some(text);
+    std::iter::from_fn(move || {
+        let whole = rest?;
+        let end = whole.bytes().position(|byte| byte == separator);
+        let cell = end.map_or(whole, |end| &whole[..end]);
+        rest = end.map(|end| &whole[end + 1..]);
+        // Most cells are numbers without spaces.
+        let is_plain = |byte: Option<&u8>| byte.is_some_and(u8::is_ascii_graphic);
+        let bytes = cell.as_bytes();
+        Some(if is_plain(bytes.first()) && is_plain(bytes.last()) { cell } else { cell.trim() })
+    })
 }
 
 /// Replaces the cells of a row, in the memory that they have.

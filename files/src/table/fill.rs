@@ -1,6 +1,6 @@
 //! Readings from the rows of a file or of columns in memory, by the roles of their columns.
 
-use std::hash::DefaultHasher;
+use std::hash::{DefaultHasher, Hasher};
 use std::path::{Path, PathBuf};
 
 use abbe_model::error::{Location, ModelError};
@@ -78,7 +78,8 @@ impl Cells for FileRow<'_> {
     }
 
     fn hash(&self, hasher: &mut DefaultHasher) {
-        std::hash::Hash::hash(&self.row.cells, hasher);
+        // In one piece: a hasher takes most of its time for the begin and the end of a piece.
+        hasher.write(self.row.cells.join("\u{1f}").as_bytes());
     }
 }
 

@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 
 use super::names;
 use super::path::{MovingAxes, Path, length, range};
-use super::polar::{PolarPath, about, mean, width_mm};
+use super::polar::{Centre, PolarPath, mean, width_mm};
 use super::results::{CircularTest, DirectionFigures};
 use super::set_up::{FigureUncertainties, SetUp};
 
@@ -59,10 +59,10 @@ pub(super) fn figures(machine: &Arc<Machine>, test: &Test, path: &Path) -> Circu
         .zip([("+", 1.0), ("-", -1.0)])
         .filter_map(|(trace, (direction, sign))| {
             let (trace, runs) = trace.as_ref()?;
-            let around = about(path, trace, |p| p.deviation_mm);
-            let (least, most) = range(&around.deviations_mm);
+            let (_, deviations_mm) = radial_deviations_mm(path, trace);
+            let (least, most) = range(&deviations_mm);
             Some(DirectionFigures {
-                set_up_u: FigureUncertainties::of(path, trace, &around.deviations_mm, &set_up),
+                set_up_u: FigureUncertainties::of(path, trace, &deviations_mm, &set_up),
                 direction: direction.to_string(),
                 runs: *runs,
                 circular_deviation_um: (most - least) * 1e3,
@@ -93,17 +93,24 @@ pub(super) fn figures(machine: &Arc<Machine>, test: &Test, path: &Path) -> Circu
     match &traces {
         [Some((there, _)), Some((back, _))] => {
             let both = PolarPath(there.0.iter().chain(&back.0).copied().collect());
-            let around = about(path, &both, |p| p.deviation_mm);
-            let (least, most) = range(&around.deviations_mm);
-            result.set_up_u = FigureUncertainties::of(path, &both, &around.deviations_mm, &set_up);
+            let (centre, deviations_mm) = radial_deviations_mm(path, &both);
+            let (least, most) = range(&deviations_mm);
+            result.set_up_u = FigureUncertainties::of(path, &both, &deviations_mm, &set_up);
             result.bidirectional_circular_deviation_um = Some((most - least) * 1e3);
-            result.mean_bidirectional_radial_deviation_um = Some(around.radius_mm * 1e3);
+            result.mean_bidirectional_radial_deviation_um = Some(centre.radius_mm * 1e3);
             let differences = there.0.iter().filter_map(|p| Some((p.deviation_mm - back.at(p.angle)?).abs()));
             result.hysteresis_um = differences.reduce(f64::max).map(|most| most * 1e3);
         }
         _ => result.not_identifiable.push("one direction only: G(b), D and hysteresis require both directions".into()),
     }
     result
+}
+
+/// The centre of a path, and the radial deviations about it, mm.
+fn radial_deviations_mm(path: &Path, trace: &PolarPath) -> (Centre<f64>, Vec<f64>) {
+    let centre = Centre::of(path, trace, |p| p.deviation_mm);
+    let deviations_mm = trace.0.iter().map(|p| centre.deviation_mm(p, p.deviation_mm)).collect();
+    (centre, deviations_mm)
 }
 
 /// Whether no linear axis moves during a test.
@@ -117,16 +124,17 @@ fn linear_axes_rest(machine: &Machine, test: &Test) -> bool {
 /// Least share of the radial direction in that of the bar: as for the bar in the plane of a circle.
 const RADIAL: f64 = 0.98;
 
-/// Whether the bar lies along the radius of a rotary axis in every reading.
+/// Whether the bar lies along the radius of a rotary axis in every reading of a test in which no other axis moves.
 fn bar_is_radial(machine: &Machine, test: &Test, axis: usize) -> bool {
     let (Some(bar), Some(readings)) = (test.station.bar(), &test.readings) else {
         return false;
     };
+    let state = |row: usize| -> Vec<f64> { readings.positions.iter().map(|column| column[row]).collect() };
+    let (origin, direction) = axis_line(machine, &state(0), axis);
+    let [origin, direction] = [origin, direction].map(Vector3::from);
     (0..readings.rows()).all(|row| {
-        let at: Vec<f64> = readings.positions.iter().map(|column| column[row]).collect();
-        let (workpiece, spindle) = balls(machine, bar, &at);
-        let (origin, direction) = axis_line(machine, &at, axis);
-        let [workpiece, spindle, origin, direction] = [workpiece, spindle, origin, direction].map(Vector3::from);
+        let (workpiece, spindle) = balls(machine, bar, &state(row));
+        let [workpiece, spindle] = [workpiece, spindle].map(Vector3::from);
         let from_axis = |ball: Vector3<f64>| (ball - origin) - direction * direction.dot(&(ball - origin));
         let (one, other) = (from_axis(workpiece), from_axis(spindle));
         let radius = if one.norm() > other.norm() { one } else { other };

@@ -5,13 +5,15 @@ use std::f64::consts::{PI, TAU};
 use num_dual::DualNum;
 
 use super::path::{MovingAxes, Path, length};
-use crate::numerics::circle;
+use crate::numerics::circle::{self, Circle};
 
 /// A reading, or the mean of the readings of several runs at one angle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PolarPoint {
     /// Angle, rad.
     pub angle: f64,
+    /// Its cosine and sine.
+    direction: [f64; 2],
     /// Observed less nominal length, mm.
     pub deviation_mm: f64,
     /// Nominal length, mm.
@@ -32,6 +34,7 @@ fn in_direction(path: &Path, direction: f64) -> Vec<PolarPath> {
         let mut points: Vec<PolarPoint> = kept
             .map(|row| PolarPoint {
                 angle: path.angle[row],
+                direction: [path.angle[row].cos(), path.angle[row].sin()],
                 deviation_mm: path.deviation_mm[row],
                 nominal_mm: path.nominal_mm[row],
                 row,
@@ -87,46 +90,51 @@ impl PolarPath {
     }
 }
 
-/// Radial deviations about the centre of the least-squares circle.
-pub(super) struct RadialDeviations<D> {
-    /// Distance from the centre less the nominal length, mm.
-    pub deviations_mm: Vec<D>,
+/// The centre of the least-squares circle of a path, about which the radial deviations are.
+pub(super) struct Centre<D> {
+    /// Whether the reading is a radius of the path.
+    radial: bool,
+    /// The mean nominal length, mm.
+    nominal_mm: f64,
+    /// The circle; `None` on a short arc, where the centre is confounded with the radius.
+    circle: Option<Circle<D>>,
     /// Radius of the circle less the nominal length, mm.
     pub radius_mm: D,
 }
 
-/// Removes the centre. If a rotary axis turns, the reading need not be a radius; the centre is then the first harmonic
-/// of the reading. `deviation` gives the deviation of a point, or with dual numbers its derivative too.
-pub(super) fn about<D: DualNum<Primitive = f64> + Copy>(
-    path: &Path,
-    trace: &PolarPath,
-    deviation: impl Fn(&PolarPoint) -> D,
-) -> RadialDeviations<D> {
-    let count = trace.0.len() as f64;
-    let nominal = trace.0.iter().map(|p| p.nominal_mm).sum::<f64>() / count;
-    let radial = matches!(path.moves, MovingAxes::Linear { radial: true, .. });
-    let nominal_of = |p: &PolarPoint| if radial { p.nominal_mm } else { nominal };
-    let points: Vec<[D; 2]> = trace
-        .0
-        .iter()
-        .map(|p| {
-            let length = deviation(p) + nominal_of(p);
-            [length * p.angle.cos(), length * p.angle.sin()]
-        })
-        .collect();
-    // On a short arc the centre is confounded with the radius.
-    let found = (path.arc() >= PI * 0.99).then(|| circle::through(&points)).flatten();
-    let Some(circle) = found else {
-        let deviations_mm: Vec<D> = trace.0.iter().map(&deviation).collect();
-        let sum = deviations_mm.iter().fold(D::from(0.0), |sum, deviation| sum + *deviation);
-        return RadialDeviations { deviations_mm, radius_mm: sum / count };
-    };
-    let distance = |p: &[D; 2]| {
-        let (x, y) = (p[0] - circle.centre[0], p[1] - circle.centre[1]);
-        (x * x + y * y).sqrt()
-    };
-    RadialDeviations {
-        deviations_mm: points.iter().zip(&trace.0).map(|(point, p)| distance(point) - nominal_of(p)).collect(),
-        radius_mm: circle.radius - nominal,
+impl<D: DualNum<Primitive = f64> + Copy> Centre<D> {
+    /// If a rotary axis turns, the reading need not be a radius; the centre is then the first harmonic of the reading.
+    /// `deviation` gives the deviation of a point, or with dual numbers its derivative too.
+    pub fn of(path: &Path, trace: &PolarPath, deviation: impl Fn(&PolarPoint) -> D) -> Centre<D> {
+        let count = trace.0.len() as f64;
+        let nominal_mm = trace.0.iter().map(|p| p.nominal_mm).sum::<f64>() / count;
+        let radial = matches!(path.moves, MovingAxes::Linear { radial: true, .. });
+        let mean = |of: &dyn Fn(&PolarPoint) -> D| trace.0.iter().fold(D::from(0.0), |sum, p| sum + of(p)) / count;
+        let mut centre = Centre { radial, nominal_mm, circle: None, radius_mm: D::from(0.0) };
+        if path.arc() >= PI * 0.99 {
+            let points: Vec<[D; 2]> = trace.0.iter().map(|p| centre.point(p, deviation(p))).collect();
+            centre.circle = circle::through(&points);
+        }
+        centre.radius_mm = match &centre.circle {
+            Some(circle) => circle.radius - nominal_mm,
+            None => mean(&deviation),
+        };
+        centre
+    }
+
+    fn nominal_mm(&self, p: &PolarPoint) -> f64 {
+        if self.radial { p.nominal_mm } else { self.nominal_mm }
+    }
+
+    fn point(&self, p: &PolarPoint, deviation: D) -> [D; 2] {
+        p.direction.map(|along| (deviation + self.nominal_mm(p)) * along)
+    }
+
+    /// Distance of a point with this deviation from the centre less the nominal length, mm.
+    pub fn deviation_mm(&self, p: &PolarPoint, deviation: D) -> D {
+        let Some(circle) = &self.circle else { return deviation };
+        let [x, y] = self.point(p, deviation);
+        let (x, y) = (x - circle.centre[0], y - circle.centre[1]);
+        (x * x + y * y).sqrt() - self.nominal_mm(p)
     }
 }

@@ -18,7 +18,7 @@ use abbe_model::session::{Prior, Test};
 use num_dual::Dual64;
 
 use super::path::Path;
-use super::polar::{PolarPath, about};
+use super::polar::{Centre, PolarPath, PolarPoint};
 
 /// Derivative of a figure, mm/mm, below which a coordinate has no part in it.
 const NO_PART: f64 = 1e-6;
@@ -78,9 +78,10 @@ impl FigureUncertainties {
         };
         let mut squares = [0.0; 4];
         for coordinate in &set_up.0 {
-            let around = about(path, trace, |p| Dual64::new(p.deviation_mm, coordinate.derivatives[p.row]));
-            let (max, min) = (around.deviations_mm[most].eps, around.deviations_mm[least].eps);
-            for (square, derivative) in squares.iter_mut().zip([max - min, max, min, around.radius_mm.eps]) {
+            let deviation = |p: &PolarPoint| Dual64::new(p.deviation_mm, coordinate.derivatives[p.row]);
+            let centre = Centre::of(path, trace, deviation);
+            let [max, min] = [most, least].map(|k| centre.deviation_mm(&trace.0[k], deviation(&trace.0[k])).eps);
+            for (square, derivative) in squares.iter_mut().zip([max - min, max, min, centre.radius_mm.eps]) {
                 if derivative.abs() > NO_PART {
                     *square += (derivative * coordinate.u_mm).powi(2);
                 }

@@ -11,9 +11,9 @@
 //! ```
 //!
 //! with the autocorrelations `R` of the process. They follow from its partial autocorrelations: the recursion of Durbin and
-//! Levinson gives the prediction of each value from those before. For `n > p` values of an autoregression of order `p` with the coefficients
-//! `a`, and `c = (1, −a₁, …, −a_p)`, the inverse is a band (Gohberg & Semencul, Mat. Issled. 7 (1972) 201), `v` being the
-//! variance that a prediction leaves:
+//! Levinson gives the prediction of each value from those before. For `n > p` values of an autoregression of order `p` with
+//! the coefficients `a`, and `c = (1, −a₁, …, −a_p)`, the inverse is a band (Gohberg & Semencul, Mat. Issled. 7 (1972) 201),
+//! `v` being the variance that a prediction leaves:
 //!
 //! ```text
 //! v (R⁻¹)_ij = h_l(0) − h_l(i + 1) − h_l(n − j),   l = j − i ≥ 0,   h_l(x) = Σ_{x ≤ k ≤ p − l} c_k c_{k+l}
