@@ -1,7 +1,8 @@
 //! Programs in the plain text of Heidenhain's TNC.
 
 use super::block::{Block, Positions, before, change, is_rotary};
-use super::iso::{number, plain, simple};
+use super::comment::{plain, simple, test_of};
+use super::iso::number;
 use super::{Control, NcOptions, Plane, Program};
 
 /// Decimals of a position.
@@ -152,8 +153,8 @@ impl Control for Heidenhain {
     fn has_tool_point(&self) -> bool {
         true
     }
-    fn name(&self, _: usize, test: &str) -> String {
-        simple(test, '_')
+    fn name(&self, test: &str) -> String {
+        simple(test)
     }
     fn text(&self, _: usize, program: &Program, options: &NcOptions) -> String {
         let mut lines = Lines::new(options.decimals(self));
@@ -173,7 +174,7 @@ impl Control for Heidenhain {
         let mut lines = Lines::new(DECIMALS);
         lines.push("BEGIN PGM main MM");
         for (name, test) in calls {
-            lines.push(&format!("; {}", plain(test)));
+            lines.push(&format!("; {}", test_of(test)));
             lines.push(&format!("CALL PGM {name}.h"));
         }
         lines.push("END PGM main MM");

@@ -1,6 +1,7 @@
 //! Programs in G codes after ISO 6983-1, as LinuxCNC, Fanuc and SINUMERIK read them.
 
 use super::block::{Block, Positions, change, is_rotary, turns};
+use super::comment::{plain, simple, test_of};
 use super::{Control, NcOptions, Plane, Program};
 
 /// What differs between controls that read G codes.
@@ -15,7 +16,7 @@ pub(super) struct Iso {
     turning: Turning,
     /// First and last block of the function that holds the tool point over the table.
     tool_point: Option<[&'static str; 2]>,
-    name: fn(usize, &str) -> String,
+    name: fn(&str) -> String,
     comment: fn(&str) -> String,
     stop: fn(&str) -> String,
     dwell: fn(f64) -> String,
@@ -53,7 +54,7 @@ pub(super) static LINUXCNC: Iso = Iso {
     has_numbers: false,
     turning: Turning::Block,
     tool_point: None,
-    name: |_, test| simple(test, '_').to_lowercase(),
+    name: |test| simple(test).to_lowercase(),
     comment: |text| format!("({})", plain(text)),
     stop: |text| format!("(MSG, {})\nM0", plain(text)),
     dwell: |seconds| format!("G4 P{seconds}"),
@@ -65,7 +66,7 @@ pub(super) static LINUXCNC: Iso = Iso {
     // The file runs alone, too: its last call is not reached from `main`.
     tail: |name| format!("M72\no<{name}> endsub\no<{name}> call\nM2\n"),
     main: |calls, _| {
-        let call = |(name, test): &(String, String)| format!("({})\no<{name}> call\n", plain(test));
+        let call = |(name, test): &(String, String)| format!("({})\no<{name}> call\n", test_of(test));
         format!("{}M2\n", calls.iter().map(call).collect::<String>())
     },
 };
@@ -81,7 +82,7 @@ pub(super) static FANUC: Iso = Iso {
     has_numbers: true,
     turning: Turning::Block,
     tool_point: Some(["G43.4 H#4111", "G49"]),
-    name: |_, test| simple(test, '_'),
+    name: simple,
     comment: |text| format!("({})", plain(text).to_uppercase()),
     stop: |text| format!("M0 ({})", plain(text).to_uppercase()),
     dwell: |seconds| format!("G4 X{seconds:.3}"),
@@ -98,7 +99,7 @@ pub(super) static FANUC: Iso = Iso {
     tail: |_| "G#2 G#3 G#5 G#6 G#7 G#15\nM99\n%\n".into(),
     main: |calls, first| {
         let call = |(number, (_, test)): (u32, &(String, String))| {
-            format!("G65 P{} ({})\n", number, plain(test).to_uppercase())
+            format!("G65 P{} ({})\n", number, test_of(test).to_uppercase())
         };
         let calls: String = (first + 1..).zip(calls).map(call).collect();
         format!("%\nO{first:04} (MAIN)\n{calls}M30\n%\n")
@@ -115,12 +116,9 @@ pub(super) static SIEMENS: Iso = Iso {
     has_numbers: false,
     turning: Turning::Word,
     tool_point: Some(["TRAORI", "TRAFOOF"]),
-    name: |number, test| {
-        let name = simple(test, '_').to_uppercase();
-        // A name begins with two letters.
-        let two = name.chars().take(2).filter(char::is_ascii_alphabetic).count() == 2;
-        if two { name } else { format!("T{}_{name}", (b'A' + (number % 26) as u8) as char) }
-    },
+    // A name begins with two letters and has 24 characters. A test called RET, MSG or CYCLE800 would be a command where
+    // it is called.
+    name: |test| format!("TEST_{:.16}", simple(test).to_uppercase()),
     comment: |text| format!("; {}", plain(text)),
     stop: |text| format!("MSG(\"{}\")\nM0\nMSG()", plain(text)),
     dwell: |seconds| format!("G4 F{seconds}"),
@@ -128,21 +126,10 @@ pub(super) static SIEMENS: Iso = Iso {
     head: |own| format!("PROC {} SAVE\nG710 G90 G94 G17 G40\nG64\n", own.name),
     tail: |_| "M17\n".into(),
     main: |calls, _| {
-        let call = |(name, test): &(String, String)| format!("{name} ; {}\n", plain(test));
+        let call = |(name, test): &(String, String)| format!("{name} ; {}\n", test_of(test));
         format!("{}M30\n", calls.iter().map(call).collect::<String>())
     },
 };
-
-/// Letters, digits and one other character in place of all the rest.
-pub(super) fn simple(name: &str, other: char) -> String {
-    name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { other }).collect()
-}
-
-/// Text that a comment may hold.
-pub(super) fn plain(text: &str) -> String {
-    let text = text.replace('°', " deg").replace('µ', "u");
-    text.chars().filter(|c| (' '..='~').contains(c) && !"()[]{};\"".contains(*c)).collect()
-}
 
 /// A number without superfluous zeros.
 pub(super) fn number(value: f64, decimals: usize) -> String {
@@ -283,8 +270,8 @@ impl Control for Iso {
     fn has_tool_point(&self) -> bool {
         self.tool_point.is_some()
     }
-    fn name(&self, number: usize, test: &str) -> String {
-        (self.name)(number, test)
+    fn name(&self, test: &str) -> String {
+        (self.name)(test)
     }
     fn text(&self, number: usize, program: &Program, options: &NcOptions) -> String {
         let heading = Heading {
@@ -317,7 +304,5 @@ mod tests {
         {
             assert_eq!(number(value, 3), text);
         }
-        assert_eq!(simple("C 150-µ", '_'), "C_150__");
-        assert_eq!(plain("A (90°, 5 µm) [x]; \"é\""), "A 90 deg, 5 um x ");
     }
 }

@@ -10,9 +10,11 @@
 //! ```
 //!
 //! - [`options`]: what the user may choose; [`block`], [`program`]: the blocks of a test, and where they come from;
+//! - `comment`: which parts of a name a program may contain;
 //! - [`CONTROLS`]: controls that read G codes, after ISO 6983-1, and the plain text of the TNC.
 
 pub mod block;
+mod comment;
 mod heidenhain;
 mod iso;
 pub mod options;
@@ -49,8 +51,8 @@ pub trait Control: Sync {
     fn has_arc(&self, plane: Plane) -> bool;
     /// Whether the control moves the tool point over the table while rotary axes turn.
     fn has_tool_point(&self) -> bool;
-    /// The name of a program by its number from 1 and the name of its test, without the ending.
-    fn name(&self, number: usize, test: &str) -> String;
+    /// The name of a program by the name of its test, without the ending.
+    fn name(&self, test: &str) -> String;
     /// The text of a program.
     fn text(&self, number: usize, program: &Program, options: &NcOptions) -> String;
     /// The program that calls the others, by name and title.
@@ -148,8 +150,8 @@ pub fn files(session: &Session, control: &dyn Control, options: &NcOptions) -> R
         let program = Program::of(session, test, control, options, centred)?;
         warnings.extend(program.warnings.iter().map(|warning| format!("test \"{}\": {warning}", test.name)));
         moves.extend(program.moves.iter().cloned());
-        let mut name = control.name(number + 1, &test.name);
-        if name == "main" || calls.iter().any(|(other, _)| *other == name) {
+        let mut name = control.name(&test.name);
+        if name == "main" || calls.iter().any(|(other, _)| other.eq_ignore_ascii_case(&name)) {
             name = format!("{name}{}", number + 1);
         }
         let file = format!("{name}.{}", control.extension());

@@ -9,6 +9,7 @@ use abbe_model::session::placing::{balls, positions_for_bar};
 use abbe_model::session::{Session, Test};
 
 use super::block::Block;
+use super::comment::{name, test_of};
 use super::path::{Leg, Path};
 use super::{Control, NcOptions};
 use crate::error::CodegenError;
@@ -61,7 +62,7 @@ impl Program {
         let Draft { blocks, warnings, moves } = draft;
         let kind = session.instrument.word();
         let mut title = vec![
-            format!("{}: test {} ({kind})", machine.name, test.name),
+            format!("Machine {}, {}, {kind}", name(&machine.name), test_of(&test.name)),
             "Positions are those of the axes in the session. The active work offset".into(),
             "and tool length must give them. This program changes neither.".into(),
         ];
@@ -227,7 +228,7 @@ impl Writer<'_> {
         });
         if let Some((above, centre)) = centre {
             let blocks = &mut draft.blocks;
-            blocks.push(Block::Comment(format!("Centring of the workpiece ball, setup {}", self.test.setup)));
+            blocks.push(Block::Comment(format!("Centring of the workpiece ball, setup {}", name(&self.test.setup))));
             self.line(self.all(&above, AxisKind::Linear), blocks);
             blocks
                 .push(Block::Stop("Mount the spindle cup, and the workpiece ball with its base loose below it".into()));
@@ -239,7 +240,7 @@ impl Writer<'_> {
         } else if ball_bar && !centred {
             draft.warn(format!(
                 "The centre of the workpiece ball, setup {}, cannot be reached: place it by measurement",
-                self.test.setup
+                name(&self.test.setup)
             ));
         }
         let first = self.fed_in(start).filter(|_| ball_bar).unwrap_or_else(|| start.to_vec());

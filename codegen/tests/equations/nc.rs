@@ -320,6 +320,94 @@ fn axes_within_one_turn_go_as_the_manuals_say() {
     assert_eq!(Counting::ALL.map(end), [360.0, 0.0, 0.0, 0.0]);
 }
 
+/// Names that a control would execute as a comment, a command or the end of a program, one for each test of `circles`.
+const HOSTILE: [&str; 8] = [
+    "logopen,pwned.log",
+    " py,open('pwned.log','w')",
+    "abort,stop",
+    "MSG,); M2\"",
+    "$PATH=/_N_WKS_DIR %",
+    "RET",
+    "* - ~",
+    "debug,#<_hal[x]> (probeopen pwned.log)",
+];
+
+/// Machine, tests and set-ups with other names.
+fn renamed(session: &Session, name: impl Fn(usize) -> String) -> Session {
+    let mut other = session.clone();
+    let mut machine = (*other.machine).clone();
+    machine.name = name(3);
+    other.machine = std::sync::Arc::new(machine);
+    for (number, test) in other.tests.iter_mut().enumerate() {
+        (test.name, test.setup) = (name(number), name(number + 1));
+    }
+    other
+}
+
+/// A name is text: the program of a hostile name is that of a harmless one, character by character.
+#[test]
+fn a_name_is_no_command_of_a_program() {
+    let place = folder("hostile");
+    let session = session(&circles(&place));
+    let hostile = renamed(&session, |number| HOSTILE[number % HOSTILE.len()].into());
+    let letter = |c: char| if c.is_ascii_alphanumeric() || " -".contains(c) { c } else { '_' };
+    let harmless = renamed(&session, |number| HOSTILE[number % HOSTILE.len()].chars().map(letter).collect());
+    let ours = ["machine", "test", "positions", "and", "segments", "this", "take", "centring", "let", "lock"];
+    let ours: Vec<&str> = ours
+        .into_iter()
+        .chain([
+            "mount",
+            "bring",
+            "feed-in",
+            "feed-out",
+            "run",
+            "measured",
+            "stop",
+            "check",
+            "back",
+            "the",
+            "overshoot",
+        ])
+        .collect();
+    for control in nc::CONTROLS {
+        let written = |session: &Session| nc::files(session, control, &NcOptions::default()).unwrap().files;
+        let files = written(&hostile);
+        assert_eq!(files, written(&harmless), "{}", control.word());
+        for (name, text) in &files {
+            assert!(name.chars().all(|c| c.is_ascii_alphanumeric() || "_.".contains(c)), "{name}");
+            for line in text.lines() {
+                let comment = match control.word() {
+                    "siemens" | "heidenhain" => line.split_once(';').map(|(_, comment)| comment),
+                    // The number of a program of Fanuc has its name behind it.
+                    _ if line.starts_with('O') => None,
+                    _ => line.split_once('(').map(|(_, comment)| comment.trim_start_matches("MSG,")),
+                };
+                let Some(comment) = comment else { continue };
+                let first = comment.trim().split([' ', ',', '.', ')']).next().unwrap().to_lowercase();
+                assert!(ours.contains(&first.as_str()), "{}: {line}", control.word());
+                assert!(!comment.contains(['%', '$', '~', ';', '=', '"', '<', '(']), "{}: {line}", control.word());
+            }
+        }
+    }
+    // The interpreter of LinuxCNC opens no file, and goes where it goes without these names.
+    if let Some(interpreter) = test_needs::program("nc", &["rs274"], &[]) {
+        let run = |session: &Session| -> Vec<String> {
+            let files = nc::files(session, nc::control("linuxcnc").unwrap(), &NcOptions::default()).unwrap().files;
+            files.iter().for_each(|(name, text)| std::fs::write(place.join(name), text).unwrap());
+            let moves = |line: &&str| !line.contains("COMMENT") && !line.contains("MESSAGE");
+            // Lines are numbered.
+            let code =
+                |line: &str| line.trim_start().trim_start_matches(|c: char| c.is_ascii_digit()).trim().to_string();
+            rs274(&interpreter, &place, "main.ngc").lines().filter(moves).map(code).collect()
+        };
+        let plain = run(&session);
+        assert!(plain.len() > 300);
+        assert_eq!(run(&hostile), plain);
+        assert!(!place.join("pwned.log").exists());
+    }
+    std::fs::remove_dir_all(place).unwrap();
+}
+
 #[test]
 fn programs_as_they_are_printed() {
     let place = folder("printed");
@@ -383,7 +471,7 @@ fn the_tool_point_stays_over_its_place_of_the_table() {
     ] {
         let files = nc::files(&session, nc::control(word).unwrap(), &options).unwrap().files;
         let (name, text) = &files[4];
-        assert!(name.starts_with("radial") || name.starts_with("RADIAL"), "{name}");
+        assert!(name.to_lowercase().contains("radial"), "{name}");
         // Lines of the TNC begin with their number.
         let is = |line: &&str, code: &str| *line == code || line.split_once(' ').is_some_and(|(_, own)| own == code);
         let inside: Vec<&str> =
