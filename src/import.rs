@@ -180,7 +180,12 @@ pub fn import(files: &[Foreign], target: Target<'_>, options: &ImportOptions) ->
     let target_mm = draft.set_targets(&with_targets(&draft.read()?))?;
     let session = draft.read()?;
     let nominal_misfit = plausibility::nominal_misfit(&session);
-    let mut warnings = session.warnings.clone();
+    let mut warnings: Vec<String> = (files.iter().zip(&chosen))
+        .flat_map(|(file, (_, reading, _))| {
+            reading.remarks.iter().map(move |remark| format!("{}: {remark}", file.name))
+        })
+        .collect();
+    warnings.extend(session.warnings.iter().cloned());
     let plausibility = checked(&session, nominal_misfit, options.allow_implausible, &mut warnings)?;
     warnings.extend(plausibility::warnings(&plausibility));
     let result = ImportResult {
@@ -207,34 +212,63 @@ fn of_file(name: &str, (message, help): Fault) -> IdentifyError {
 }
 
 /// The way to read a file that the nominal machine explains best. Ways of which one cannot be read are none.
+///
+/// # Errors
+/// If the nominal machine explains another way as well.
 fn best(draft: &Draft, test: &str, file: &Foreign, found: &Understood) -> Result<Reading, IdentifyError> {
     if let [only] = &found.readings[..] {
         return Ok(only.clone());
     }
-    let tried = found.readings.iter().map(|reading| {
-        let mut draft = draft.clone();
-        draft.apply(test, file, reading)?;
-        let session = draft.read_alone(test)?;
-        Ok::<f64, ModelError>(plausibility::nominal_misfit(&session).unwrap_or(f64::INFINITY))
-    });
-    let mut least: Option<(f64, &Reading)> = None;
+    let mut tried: Vec<(f64, f64, &Reading)> = Vec::new();
     let mut refused: Option<ModelError> = None;
-    for (misfit, reading) in tried.zip(&found.readings) {
-        match misfit {
-            Ok(misfit) if least.is_none_or(|(least, _)| misfit < least) => least = Some((misfit, reading)),
-            Ok(_) => {}
+    for reading in &found.readings {
+        let mut draft = draft.clone();
+        let session = draft.apply(test, file, reading).and_then(|_| draft.read_alone(test));
+        match session {
+            Ok(session) => {
+                // Lengths in a larger unit leave a larger residual, but no larger share of them.
+                let scale_mm = if is_two_sided(&session) { reading.scale_mm } else { 1.0 };
+                let misfit = plausibility::nominal_misfit(&session).unwrap_or(f64::INFINITY);
+                tried.push((misfit / scale_mm, max_misfit(&session) / scale_mm, reading));
+            }
             Err(error) => refused = refused.or(Some(error)),
         }
     }
-    match (least, refused) {
-        (Some((_, reading)), _) => Ok(reading.clone()),
-        (None, Some(error)) => Err(error.into()),
-        (None, None) => Err(IdentifyError::NoReadings),
+    tried.sort_by(|(a, ..), (b, ..)| a.total_cmp(b));
+    match (&tried[..], refused) {
+        ([], Some(error)) => Err(error.into()),
+        ([], None) => Err(IdentifyError::NoReadings),
+        ([(misfit, _, reading), (second, most, other), ..], _)
+            if *second < most.min(AS_WELL * misfit.max(f64::MIN_POSITIVE)) =>
+        {
+            let [read, otherwise] = [reading, other].map(|way| (way.assumes.join("; "), &way.columns));
+            let differs = (read.1.iter().zip(otherwise.1)).find_map(|(one, other)| {
+                (one.own != other.own).then_some((one.own.as_ref()?, other.own.as_ref()?, one))
+            });
+            let help = differs.map_or(String::new(), |(one, other, column)| {
+                let theirs = if column.name.is_empty() { column.number.to_string() } else { column.name.clone() };
+                format!(", or say what a column holds: {one}={theirs} or {other}={theirs}")
+            });
+            let message = format!("units are not stated, and two readings fit as well: {}; or {}", read.0, otherwise.0);
+            Err(of_file(&file.name, (message, format!("state the units in the names of the columns{help}"))))
+        }
+        ([(_, _, reading), ..], _) => Ok((*reading).clone()),
     }
+}
+
+/// Factor of the misfit up to which a second way to read a file fits as well as the best.
+const AS_WELL: f64 = 2.0;
+
+fn is_two_sided(session: &Session) -> bool {
+    session.instruments().iter().any(|kind| kind.is_two_sided())
 }
 
 /// Misfit of the nominal machine above which a session that cannot be fitted is refused: a share of the spread of poses, or mm.
 const MAX_MISFIT: [f64; 2] = [0.02, 1.0];
+
+fn max_misfit(session: &Session) -> f64 {
+    MAX_MISFIT[usize::from(is_two_sided(session))]
+}
 
 /// Noise of a coordinate of poses, mm, if a session states none. The residual of a wrong machine, taken for noise, would hide
 /// its location errors.
@@ -248,9 +282,8 @@ fn checked(
     allow_implausible: bool,
     warnings: &mut Vec<String>,
 ) -> Result<Plausibility, IdentifyError> {
-    let two_sided = session.instruments().iter().any(|kind| kind.is_two_sided());
-    let explained = nominal_misfit.is_some_and(|misfit| misfit < MAX_MISFIT[usize::from(two_sided)]);
-    let stated = match two_sided {
+    let explained = nominal_misfit.is_some_and(|misfit| misfit < max_misfit(session));
+    let stated = match is_two_sided(session) {
         true => session.clone(),
         false => Session { noise_mm: session.noise_mm.or(Some(NOISE_MM)), ..session.clone() },
     };

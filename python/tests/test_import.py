@@ -1,5 +1,7 @@
 """Foreign files of readings."""
 
+import warnings
+
 import pytest
 from conftest import SESSIONS
 
@@ -11,7 +13,10 @@ ROBOT = SESSIONS / "ur10" / "machine.toml"
 
 def test_a_foreign_file_becomes_a_session(tmp_path):
     out = tmp_path / "run1"
-    imported = abbe.import_readings(FOREIGN / "deutsch.csv", machine=ROBOT, out=out)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        imported = abbe.import_readings(FOREIGN / "deutsch.csv", machine=ROBOT, out=out)
+    assert [str(warning.message) for warning in told] == imported.result["warnings"]
     assert imported.path == out / "session.toml" and imported.path.exists()
     assert imported.result["instrument"] == "tracker"
     (test,) = imported.result["tests"]

@@ -67,7 +67,4 @@ fn of_test(report: &mut Report, test: &ImportedTest) {
     for reason in &test.normalised {
         report.key(format!("{reason}: a session reads {} in place of the file", test.data));
     }
-    for remark in &test.remarks {
-        report.key(remark.clone());
-    }
 }

@@ -4,6 +4,7 @@ use abbe_model::instrument::Fault;
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
 use super::unit;
+use crate::table::comment::is_comment;
 use crate::table::encoding;
 
 /// A separator; `None` is any number of spaces.
@@ -57,6 +58,17 @@ impl Grid {
 
     pub fn skipped_lines(&self) -> usize {
         self.header_line.unwrap_or_else(|| self.rows.first().map_or(0, |row| row.line))
+    }
+
+    /// The lines below the first row that are no rows.
+    pub fn lost_in_words(&self) -> Vec<String> {
+        let last = self.rows.last().map_or(0, |row| row.line);
+        let (within, after): (Vec<usize>, Vec<usize>) = self.lost.iter().partition(|line| **line < last);
+        [("lines follow the last row", after), ("lines between the rows are no rows", within)]
+            .into_iter()
+            .filter(|(_, lines)| !lines.is_empty())
+            .map(|(words, lines)| format!("{words}: {}", of_lines(&lines)))
+            .collect()
     }
 
     /// A fault with the layout in which the file was read, which may be its reason.
@@ -126,8 +138,7 @@ pub(super) fn of(bytes: &[u8]) -> Result<Grid, Fault> {
         grid.unreadable.push("its columns are separated by spaces".into());
     }
     let last = grid.rows.last().map_or(0, |row| row.line);
-    let footer = grid.lost.iter().filter(|line| **line > last).count();
-    let within = grid.lost.len() - footer;
+    let within = grid.lost.iter().filter(|line| **line < last).count();
     if within as f64 > MAX_LOST * grid.rows.len() as f64 {
         let found = format!(
             "{within} of {} lines below the first row are no rows of {width} columns, line {} the first",
@@ -136,12 +147,8 @@ pub(super) fn of(bytes: &[u8]) -> Result<Grid, Fault> {
         );
         return Err(grid.with_layout((found, "export every reading with the same columns".into())));
     }
-    if footer > 0 {
-        grid.unreadable.push(format!("lines follow the last row: {}", of_lines(&grid.lost[within..])));
-    }
-    if within > 0 {
-        grid.unreadable.push(format!("lines between the rows are no rows: {}", of_lines(&grid.lost[..within])));
-    }
+    let lost = grid.lost_in_words();
+    grid.unreadable.extend(lost);
     comma_twice(&grid, &lines)?;
     Ok(grid)
 }
@@ -175,10 +182,6 @@ fn decoded(bytes: &[u8]) -> (String, &'static str) {
 
 fn is_blank(line: &str) -> bool {
     line.trim().is_empty()
-}
-
-fn is_comment(line: &str) -> bool {
-    line.trim_start().starts_with('#')
 }
 
 /// The cells of a line, without surrounding spaces and quotes.

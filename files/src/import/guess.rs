@@ -55,7 +55,8 @@ pub fn instrument(bytes: &[u8], machine: &Machine, hints: &[Hint]) -> Result<Ins
     let mut of_most: Option<Fault> = None;
     for &kind in InstrumentKind::ALL {
         let Some(station) = station(kind, &any_set_up(kind)) else { continue };
-        let expected = Expected { machine, station: &station, circle: None, moved: only_axis(machine), hints };
+        let expected =
+            Expected { machine, station: &station, circle: None, moved: only_axis(machine), planned: None, hints };
         match hint::found(&grid, &expected).and_then(|found| meaning::of(&grid, &expected, found)) {
             Ok(found) => {
                 let readings = found.iter().filter(|one| one.is_reading()).count();

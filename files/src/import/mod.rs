@@ -55,6 +55,8 @@ pub struct Expected<'a> {
     pub circle: Option<Circle>,
     /// The axis that alone moves in the test.
     pub moved: Option<usize>,
+    /// The range of the planned positions of each axis, mm and rad, if the test plans a motion.
+    pub planned: Option<Vec<[f64; 2]>>,
     /// What the user says of columns.
     pub hints: &'a [Hint],
 }
@@ -92,6 +94,8 @@ pub struct Understood {
 pub struct Reading {
     /// What it assumes that the file does not state, such as "J1 to J6 are in radians"; empty if nothing.
     pub assumes: Vec<String>,
+    /// Millimetres in the unit of length that it assumes; 1 if it assumes none.
+    pub scale_mm: f64,
     /// The columns with the units assumed.
     pub columns: Vec<ColumnFound>,
     /// How a session reads it.

@@ -10,7 +10,7 @@ use abbe_model::instrument::Fault;
 
 use super::grid::{Grid, number};
 use super::meaning::{ColumnFound, Found, Meaning};
-use super::open_units::{self, open};
+use super::open_units::{self, Choice, open};
 use super::unit::Unit;
 use super::values::Values;
 use super::words::Direction;
@@ -28,21 +28,14 @@ pub(super) fn readings(
     expected: &Expected<'_>,
 ) -> Result<Vec<Reading>, Fault> {
     let values = Values::of(grid, found, expected)?;
-    let mut choices: Vec<(Vec<String>, BTreeMap<usize, Unit>)> = vec![(Vec::new(), BTreeMap::new())];
+    let mut choices: Vec<Vec<Choice>> = vec![Vec::new()];
     for options in open(grid, found, expected, &values)? {
         let before = std::mem::take(&mut choices);
-        for (text, units) in options {
-            for (texts, chosen) in &before {
-                let mut texts = texts.clone();
-                texts.push(text.clone());
-                choices.push((texts, chosen.iter().chain(&units).map(|(column, unit)| (*column, *unit)).collect()));
-            }
+        for option in options {
+            choices.extend(before.iter().map(|chosen| chosen.iter().chain([&option]).cloned().collect::<Vec<_>>()));
         }
     }
-    Ok(choices
-        .into_iter()
-        .map(|(assumes, units)| reading(name, grid, found, expected, &values, assumes, &units))
-        .collect())
+    Ok(choices.iter().map(|chosen| reading(name, grid, found, expected, &values, chosen)).collect())
 }
 
 /// The table in one way.
@@ -52,9 +45,11 @@ fn reading(
     found: &[Found],
     expected: &Expected<'_>,
     values: &Values,
-    assumes: Vec<String>,
-    chosen: &BTreeMap<usize, Unit>,
+    chosen: &[Choice],
 ) -> Reading {
+    let assumes: Vec<String> = chosen.iter().map(|choice| choice.text.clone()).collect();
+    let scale_mm = chosen.iter().map(|choice| choice.scale_mm).product();
+    let chosen: BTreeMap<usize, Unit> = chosen.iter().flat_map(|choice| choice.units.clone()).collect();
     let unit = |one: &Found| {
         let stated = one.unit.filter(|unit| !unit.is_ambiguous() && !matches!(one.meaning, Meaning::Driver(_)));
         let unit = stated.or(chosen.get(&one.column).copied()).unwrap_or(Unit::of_own("1"));
@@ -91,6 +86,7 @@ fn reading(
     let unused: Vec<String> =
         columns.iter().filter(|column| column.own.is_none()).map(|column| grid.name(column.number - 1)).collect();
     let mut remarks = assumes.clone();
+    remarks.extend(grid.lost_in_words().into_iter().chain(values.left_out.iter().cloned()));
     if !unused.is_empty() {
         remarks.push(format!("not read: {}", unused.join(", ")));
     }
@@ -99,7 +95,7 @@ fn reading(
     } else {
         Source::Normalised { csv: normalised(name, grid, found, expected, values, &unit, &because), because }
     };
-    Reading { assumes, columns, source, remarks }
+    Reading { assumes, scale_mm, columns, source, remarks }
 }
 
 /// Our name of a column, with its unit.

@@ -18,16 +18,28 @@ const MAX_TURN_RAD: f64 = 6.5;
 const NEAR_REFERENCE: f64 = 0.05;
 /// Positions beyond this are not in m.
 const MAX_M: f64 = 20.0;
-/// Deviations whose root mean square is below the first are in mm, those above the second in µm, where no unit is stated.
-/// Between them they may be both.
-const DEVIATIONS: [f64; 2] = [0.05, 5.0];
+/// Deviations whose root mean square is at most this, mm, may be in the unit of the lengths beside them, and those of at
+/// least this, µm, in µm.
+const MAX_DEVIATION_MM: f64 = 5.0;
+const MIN_DEVIATION_UM: f64 = 0.05;
+/// Factor by which the range of positions may differ from the planned one: less than that between two units.
+const NEAR_PLAN: f64 = 5.0;
+/// Share of its travel by which an axis may exceed it: a reading behind the end of a drawing is no other unit.
+const BEYOND: f64 = 0.5;
 /// Times beyond this are in ms: of seconds since 1970 it is the year 5138.
 const MAX_TIME_S: f64 = 1e11;
 /// Temperatures from this on are in kelvins.
 const MIN_KELVIN: f64 = 200.0;
 
-/// The units of columns that state none, with the assumption in words.
-pub(super) type Choice = (String, BTreeMap<usize, Unit>);
+/// Units of columns that state none.
+#[derive(Clone)]
+pub(super) struct Choice {
+    /// The assumption in words.
+    pub text: String,
+    pub units: BTreeMap<usize, Unit>,
+    /// Millimetres in the unit of the lengths; 1 where none is chosen.
+    pub scale_mm: f64,
+}
 
 /// Whether our column has no unit.
 pub(super) fn has_no_unit(meaning: &Meaning, expected: &Expected<'_>) -> bool {
@@ -40,7 +52,9 @@ pub(super) fn has_no_unit(meaning: &Meaning, expected: &Expected<'_>) -> bool {
     }
 }
 
-/// For each group of columns without a stated unit, the units that their values allow, the most probable first.
+/// For each group of columns without a stated unit, the units that their values allow, the most probable first. A file has
+/// one unit of length and one of angle, unless its header says otherwise; what the test plans and how far the axes travel
+/// decide between units before a fit does.
 ///
 /// # Errors
 /// If the unit of deviations can be told neither from the values nor by a fit: what to state.
@@ -50,116 +64,222 @@ pub(super) fn open(
     expected: &Expected<'_>,
     values: &Values,
 ) -> Result<Vec<Vec<Choice>>, Fault> {
-    let machine = expected.machine;
-    let without = |of: &dyn Fn(&Meaning) -> bool| -> Vec<usize> {
-        let is_open = |one: &&Found| one.unit.is_none() && !has_no_unit(&one.meaning, expected) && of(&one.meaning);
-        found.iter().filter(is_open).map(|one| one.column).collect()
-    };
-    let of_kind = |kind: AxisKind| {
-        move |meaning: &Meaning| match meaning {
-            Meaning::Axis(axis) => machine.axes[*axis].kind == kind,
-            Meaning::Polar => kind == AxisKind::Rotary,
-            _ => false,
-        }
-    };
-    let named = |columns: &[usize]| {
-        let names: Vec<String> = columns.iter().map(|column| format!("`{}`", grid.name(*column))).collect();
-        listed(&names, "and")
-    };
-    let choices = |columns: &[usize], units: &[&'static str]| -> Vec<Choice> {
-        let of_unit = |own: &&'static str| {
-            let text = format!("the unit of {} is not stated: {own} is read", named(columns));
-            (text, columns.iter().map(|column| (*column, unit_of(own))).collect())
-        };
-        units.iter().map(of_unit).collect()
-    };
-    let mut open = Vec::new();
-    let rotary = without(&of_kind(AxisKind::Rotary));
-    if !rotary.is_empty() {
-        let is_arm = machine.axes.iter().filter(|axis| axis.kind == AxisKind::Rotary).count() > 2;
-        let units: &[&str] = match (values.largest(&rotary) <= MAX_TURN_RAD, is_arm) {
-            (false, _) => &["deg"],
-            (true, true) => &["rad", "deg"],
-            (true, false) => &["deg", "rad"],
-        };
-        open.push(choices(&rotary, units));
-    }
-    let linear = without(&of_kind(AxisKind::Linear));
-    if !linear.is_empty() {
-        let units: &[&str] = if values.largest(&linear) < MAX_M { &["mm", "m", "in"] } else { &["mm", "in"] };
-        open.push(choices(&linear, units));
-    }
-    let unit_of_reading = |meaning: &Meaning| {
-        match meaning {
-            Meaning::Reading(stem, _) => expected.station.columns().iter().find(|column| column.stem == *stem),
-            _ => None,
-        }
-        .map(|column| column.unit)
-    };
-    let lengths = without(&|meaning| unit_of_reading(meaning) == Some("mm"));
-    if !lengths.is_empty() {
-        let reference = expected.station.reference_mm();
-        let median = values.median(lengths[0]);
-        let near = |unit: &&&str| {
-            let mm = unit_of(unit).to_internal(median);
-            reference > 0.0 && (mm / reference - 1.0).abs() < NEAR_REFERENCE
-        };
-        let units: Vec<&'static str> = match ["mm", "um", "m", "in"].iter().find(near) {
-            Some(unit) => vec![unit],
-            None if values.largest(&lengths) < MAX_M => vec!["m", "mm", "in"],
-            None => vec!["mm", "in"],
-        };
-        open.push(choices(&lengths, &units));
-    }
-    let deviations = without(&|meaning| unit_of_reading(meaning) == Some("um"));
-    if let [first, ..] = deviations[..] {
-        let rms = values.rms(&deviations);
-        if (DEVIATIONS[0]..=DEVIATIONS[1]).contains(&rms) {
-            let what = format!(
-                "the unit of {} is not stated, and deviations of {} rms may be in mm or in µm",
-                named(&deviations),
-                number(rms)
-            );
-            let stem = found.iter().find(|one| one.column == first).map_or("", |one| one.meaning.stem());
-            let help = format!(
-                "state the unit in the name of the column, or say what it holds: {stem}_um={0} or {stem}_mm={0}",
-                grid.name(first)
-            );
-            return Err((what, help));
-        }
-        open.push(choices(&deviations, &[if rms < DEVIATIONS[0] { "mm" } else { "um" }]));
-    }
-    // Directions may be in radians, small rotations are in our unit.
-    let directions = without(&|meaning| unit_of_reading(meaning) == Some("deg"));
-    if !directions.is_empty() {
-        let units: &[&str] = if values.largest(&directions) <= MAX_TURN_RAD { &["rad", "deg"] } else { &["deg"] };
-        open.push(choices(&directions, units));
-    }
-    for (own, is_of) in [
-        ("arcsec", &(|meaning: &Meaning| unit_of_reading(meaning) == Some("arcsec")) as &dyn Fn(&Meaning) -> bool),
-        ("s", &|meaning| *meaning == Meaning::Time),
-        ("c", &|meaning| *meaning == Meaning::Temperature),
+    let columns = Open { grid, found, expected, values };
+    let mut open = vec![columns.lengths()?, columns.angles()];
+    let is_of = |unit: &'static str| move |meaning: &Meaning| unit_of_reading(meaning, expected) == Some(unit);
+    // Small rotations are in our unit.
+    for (own, columns) in [
+        ("arcsec", columns.without(&is_of("arcsec"))),
+        ("s", columns.without(&|meaning| *meaning == Meaning::Time)),
+        ("c", columns.without(&|meaning| *meaning == Meaning::Temperature)),
     ] {
-        let columns = without(is_of);
         let unit = match own {
             "s" if values.median(columns.first().copied().unwrap_or(0)) > MAX_TIME_S => "ms",
             "c" if values.largest(&columns) > MIN_KELVIN => "k",
             own => own,
         };
-        if !columns.is_empty() {
-            open.push(choices(&columns, &[unit]));
-        }
+        open.push(choice(grid, &[(&columns, unit)]).into_iter().collect());
     }
     let ambiguous: Vec<usize> =
         found.iter().filter(|one| one.unit.is_some_and(Unit::is_ambiguous)).map(|one| one.column).collect();
     if !ambiguous.is_empty() {
-        let of_unit = |(word, unit): (&str, Unit)| {
-            let text = format!("`grad` of {} may be a degree or a gon: {word} is read", named(&ambiguous));
-            (text, ambiguous.iter().map(|column| (*column, unit)).collect())
+        let of_unit = |(word, unit): (&str, Unit)| Choice {
+            text: format!("`grad` of {} may be a degree or a gon: {word} is read", named(grid, &ambiguous)),
+            units: ambiguous.iter().map(|column| (*column, unit)).collect(),
+            scale_mm: 1.0,
         };
         open.push(unit::DEGREE_OR_GON.map(of_unit).to_vec());
     }
+    open.retain(|choices| !choices.is_empty());
     Ok(open)
+}
+
+/// The columns of a file with what is known of them.
+struct Open<'o> {
+    grid: &'o Grid,
+    found: &'o [Found],
+    expected: &'o Expected<'o>,
+    values: &'o Values,
+}
+
+impl Open<'_> {
+    /// The columns of these meanings that state no unit.
+    fn without(&self, of: &dyn Fn(&Meaning) -> bool) -> Vec<usize> {
+        let is_open =
+            |one: &&Found| one.unit.is_none() && !has_no_unit(&one.meaning, self.expected) && of(&one.meaning);
+        self.found.iter().filter(is_open).map(|one| one.column).collect()
+    }
+
+    /// The one unit that the columns of these meanings state.
+    fn stated(&self, of: &dyn Fn(&Meaning) -> bool) -> Option<&'static str> {
+        let mut stated = self.found.iter().filter(|one| of(&one.meaning)).filter_map(|one| Some(one.unit?.word()));
+        let first = stated.next()?;
+        stated.all(|other| other == first).then_some(first)
+    }
+
+    fn is_axis(&self, kind: AxisKind) -> impl Fn(&Meaning) -> bool {
+        let axes = &self.expected.machine.axes;
+        move |meaning: &Meaning| match meaning {
+            Meaning::Axis(axis) => axes[*axis].kind == kind,
+            Meaning::Polar => kind == AxisKind::Rotary,
+            _ => false,
+        }
+    }
+
+    /// Of these units, those in which the positions are those that the test plans, or that the travel allows; all if there
+    /// are none.
+    fn possible(&self, columns: &[usize], units: &[&'static str]) -> Vec<&'static str> {
+        let axis = |column: &usize| match self.found.iter().find(|one| one.column == *column)?.meaning {
+            Meaning::Axis(axis) => Some((axis, self.values.range(*column)?)),
+            _ => None,
+        };
+        let moves: Vec<(usize, [f64; 2])> = columns.iter().filter_map(axis).collect();
+        let is_possible = |unit: &&&'static str| {
+            moves.iter().all(|(axis, range)| {
+                let [low, high] = range.map(|value| unit_of(unit).to_internal(value));
+                let is_near = |found: f64, planned: f64| {
+                    let ratio = found / planned;
+                    !ratio.is_finite() || ratio == 0.0 || (1.0 / NEAR_PLAN..NEAR_PLAN).contains(&ratio)
+                };
+                match (
+                    self.expected.planned.as_ref().and_then(|planned| planned.get(*axis)),
+                    &self.expected.machine.axes[*axis].travel,
+                ) {
+                    (Some([from, to]), _) if to > from => is_near(high - low, to - from),
+                    (Some([at, _]), _) => is_near(low.abs().max(high.abs()), at.abs()),
+                    (None, Some([from, to])) => low > from - BEYOND * (to - from) && high < to + BEYOND * (to - from),
+                    (None, None) => true,
+                }
+            })
+        };
+        let possible: Vec<&str> = units.iter().filter(is_possible).copied().collect();
+        if possible.is_empty() { units.to_vec() } else { possible }
+    }
+
+    /// Positions and readings that are lengths, and deviations, which are often in µm beside them.
+    fn lengths(&self) -> Result<Vec<Choice>, Fault> {
+        let expected = self.expected;
+        let is_deviation = |meaning: &Meaning| unit_of_reading(meaning, expected) == Some("um");
+        let is_length = |meaning: &Meaning| unit_of_reading(meaning, expected) == Some("mm");
+        let linear = self.without(&self.is_axis(AxisKind::Linear));
+        let lengths = self.without(&is_length);
+        let deviations = self.without(&is_deviation);
+        let stated = self
+            .stated(&|meaning| self.is_axis(AxisKind::Linear)(meaning) || is_length(meaning))
+            .filter(|unit| *unit != "um");
+        let both: Vec<usize> = linear.iter().chain(&lengths).copied().collect();
+        let units: &[&str] = match (self.values.largest(&both) < MAX_M, linear.is_empty()) {
+            (true, false) => &["mm", "m", "in"],
+            (true, true) => &["m", "mm", "in"],
+            (false, _) => &["mm", "in"],
+        };
+        let reference = expected.station.reference_mm();
+        let near = |unit: &&&str| {
+            let mm = unit_of(unit).to_internal(self.values.median(lengths[0]));
+            reference > 0.0 && (mm / reference - 1.0).abs() < NEAR_REFERENCE
+        };
+        let of_reference = (!lengths.is_empty()).then(|| ["mm", "um", "m", "in"].iter().find(near).copied()).flatten();
+        let mut units = self.possible(&linear, units);
+        let known = stated.or(of_reference.filter(|unit| units.contains(unit)));
+        if let Some(known) = known.filter(|known| units.contains(known) || linear.is_empty()) {
+            units = vec![known];
+        }
+        if both.is_empty() {
+            units = vec![stated.unwrap_or("mm")];
+        } else if self.values.largest(&both) == 0.0 {
+            units.truncate(1);
+        }
+        let mut choices = Vec::new();
+        for unit in units {
+            let groups = [
+                (&linear, unit),
+                (&lengths, of_reference.unwrap_or(unit)),
+                (&deviations, self.unit_of_deviations(&deviations, unit)?),
+            ];
+            choices.extend(choice(self.grid, &groups));
+        }
+        Ok(choices)
+    }
+
+    /// The unit of deviations beside lengths in a unit.
+    fn unit_of_deviations(&self, deviations: &[usize], beside: &'static str) -> Result<&'static str, Fault> {
+        let [first, ..] = deviations[..] else { return Ok(beside) };
+        let rms = self.values.rms(deviations);
+        let mm = unit_of(beside).to_internal(rms);
+        match (mm <= MAX_DEVIATION_MM, rms >= MIN_DEVIATION_UM) {
+            (true, false) => Ok(beside),
+            (false, _) => Ok("um"),
+            (true, true) => {
+                let what = format!(
+                    "the unit of {} is not stated, and deviations of {} rms may be in {beside} or in µm",
+                    named(self.grid, deviations),
+                    number(rms)
+                );
+                let stem = self.found.iter().find(|one| one.column == first).map_or("", |one| one.meaning.stem());
+                let help = format!(
+                    "state the unit in the name of the column, or say what it holds: {stem}_um={0} or {stem}_{beside}={0}",
+                    self.grid.name(first)
+                );
+                Err((what, help))
+            }
+        }
+    }
+
+    /// Positions of rotary axes and directions.
+    fn angles(&self) -> Vec<Choice> {
+        let is_direction = |meaning: &Meaning| unit_of_reading(meaning, self.expected) == Some("deg");
+        let rotary = self.without(&self.is_axis(AxisKind::Rotary));
+        let directions = self.without(&is_direction);
+        let both: Vec<usize> = rotary.iter().chain(&directions).copied().collect();
+        let axes = &self.expected.machine.axes;
+        let is_arm = axes.iter().filter(|axis| axis.kind == AxisKind::Rotary).count() > 2;
+        let units: &[&str] = match (self.values.largest(&both) <= MAX_TURN_RAD, is_arm || rotary.is_empty()) {
+            (false, _) => &["deg"],
+            (true, true) => &["rad", "deg"],
+            (true, false) => &["deg", "rad"],
+        };
+        let mut units = self.possible(&rotary, units);
+        // A direction beside positions in another unit is one that a fit decides.
+        if let Some(stated) = self.stated(&self.is_axis(AxisKind::Rotary)).filter(|unit| units.contains(unit)) {
+            match rotary.is_empty() {
+                true => units.sort_by_key(|unit| *unit != stated),
+                false => units = vec![stated],
+            }
+        }
+        if self.values.largest(&both) == 0.0 {
+            units.truncate(1);
+        }
+        units.into_iter().filter_map(|unit| choice(self.grid, &[(&both, unit)])).collect()
+    }
+}
+
+/// The unit in which messages name the readings of a column; `None` for a column of another kind.
+fn unit_of_reading(meaning: &Meaning, expected: &Expected<'_>) -> Option<&'static str> {
+    let Meaning::Reading(stem, _) = meaning else { return None };
+    expected.station.columns().iter().find(|column| column.stem == *stem).map(|column| column.unit)
+}
+
+/// Groups of columns, each in a unit; `None` if they have no columns.
+fn choice(grid: &Grid, groups: &[(&Vec<usize>, &'static str)]) -> Option<Choice> {
+    let mut by_unit: Vec<(&str, Vec<usize>)> = Vec::new();
+    for (columns, unit) in groups.iter().filter(|(columns, _)| !columns.is_empty()) {
+        match by_unit.iter_mut().find(|(own, _)| own == unit) {
+            Some((_, all)) => all.extend(columns.iter()),
+            None => by_unit.push((unit, columns.to_vec())),
+        }
+    }
+    let texts = by_unit
+        .iter()
+        .map(|(unit, columns)| format!("the unit of {} is not stated: {unit} is read", named(grid, columns)));
+    let units = by_unit.iter().flat_map(|(own, columns)| columns.iter().map(move |column| (*column, unit_of(own))));
+    let first = by_unit.first().map(|(unit, _)| unit_of(unit))?;
+    let scale_mm = if first.is_length() { first.to_internal(1.0) } else { 1.0 };
+    Some(Choice { text: texts.collect::<Vec<_>>().join("; "), units: units.collect(), scale_mm })
+}
+
+fn named(grid: &Grid, columns: &[usize]) -> String {
+    let names: Vec<String> = columns.iter().map(|column| format!("`{}`", grid.name(*column))).collect();
+    listed(&names, "and")
 }
 
 /// A unit of these lists.

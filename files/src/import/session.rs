@@ -14,6 +14,7 @@ use abbe_model::document::test::Test;
 use abbe_model::error::{Location, ModelError};
 use abbe_model::instrument::{Fault, InstrumentKind};
 use abbe_model::session::motion::Motion;
+use abbe_model::session::planned::checked_plan;
 use abbe_model::session::{Session, trajectory};
 
 use super::foreign::Foreign;
@@ -341,6 +342,7 @@ impl Draft {
             station: &own.station,
             circle: circle.map(|(axes, centre_mm, amplitude_mm)| Circle { axes, centre_mm, amplitude_mm }),
             moved: moved(&planned.machine, own),
+            planned: ranges(&planned.machine, own),
             hints,
         };
         understand(&file.name, &file.bytes, &expected)
@@ -448,6 +450,16 @@ fn moved(machine: &Machine, test: &abbe_model::session::Test) -> Option<usize> {
             rotary.next().filter(|_| rotary.next().is_none())
         }),
     }
+}
+
+/// The range of the planned positions of each axis, mm and rad.
+fn ranges(machine: &Machine, test: &abbe_model::session::Test) -> Option<Vec<[f64; 2]>> {
+    let moves = !matches!(test.motion, Some(Motion::List) | None);
+    let readings = checked_plan(machine, test).ok().filter(|_| moves)?;
+    let range = |column: &Vec<f64>| {
+        column.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(*q), high.max(*q)])
+    };
+    Some(readings.positions.iter().map(range).collect())
 }
 
 /// The name of a file that is not there yet.

@@ -21,6 +21,8 @@ pub(super) struct Values {
     pub rows: Vec<usize>,
     /// What a reader of tables would not accept.
     pub unreadable: Vec<String>,
+    /// The rows that lack a number, in words.
+    pub left_out: Vec<String>,
 }
 
 /// What the cells of the columns need besides a reader of tables.
@@ -75,9 +77,10 @@ impl Values {
             return Err((found, "export every reading, or say with a hint which columns to read".into()));
         }
         let mut unreadable = grid.unreadable.clone();
-        if let Some(line) = first_dropped {
-            unreadable.push(format!("{} without a number, line {line} the first, left out", counted(dropped, "row")));
-        }
+        let left_out: Vec<String> = (first_dropped.iter())
+            .map(|line| format!("{} without a number, line {line} the first, left out", counted(dropped, "row")))
+            .collect();
+        unreadable.extend(left_out.iter().cloned());
         if needs.units {
             unreadable.push("numbers have their units behind them".into());
         }
@@ -87,12 +90,20 @@ impl Values {
         if needs.signs {
             unreadable.push("numbers have signs between thousands or a sign of their own for minus".into());
         }
-        Ok(Values { by_column, rows, unreadable })
+        Ok(Values { by_column, rows, unreadable, left_out })
     }
 
     pub fn largest(&self, columns: &[usize]) -> f64 {
         let values = columns.iter().filter_map(|column| self.by_column.get(column)).flatten();
         values.map(|value| value.abs()).filter(|value| value.is_finite()).fold(0.0, f64::max)
+    }
+
+    /// The least and the largest number of a column; `None` if it has none.
+    pub fn range(&self, column: usize) -> Option<[f64; 2]> {
+        let values = self.by_column.get(&column)?.iter().copied().filter(|value| value.is_finite());
+        let range =
+            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]);
+        (range[0] <= range[1]).then_some(range)
     }
 
     pub fn median(&self, column: usize) -> f64 {

@@ -1,6 +1,6 @@
 //! CSV: rows of cells in a text, with a separator between cells. Read with any layout, written with our column names.
 //!
-//! A header line, then one row per reading. A `#` starts a comment line. Empty lines, a byte order mark and CRLF are
+//! A header line, then one row per reading. A `#` starts a comment line, unless it begins the error of a cell (`#REF!`). Empty lines, a byte order mark and CRLF are
 //! accepted.
 
 use std::path::Path;
@@ -12,6 +12,7 @@ use abbe_model::instrument::Station;
 use abbe_model::instrument::column::{Column, Quantity};
 use abbe_model::session::readings::Readings;
 
+use super::comment::is_comment;
 use super::format::{Content, DataFormat, Rows, Table};
 use super::lines::Lines;
 use super::request::Request;
@@ -75,7 +76,7 @@ impl Rows for CsvRows {
     fn next_row(&mut self) -> Result<Option<Row>, ModelError> {
         while let Some(line) = self.lines.next_line()? {
             let content = line.text.trim();
-            if content.is_empty() || content.starts_with('#') {
+            if content.is_empty() || is_comment(content) {
                 continue;
             }
             let cells = if line.text.contains('"') {

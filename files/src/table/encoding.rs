@@ -24,7 +24,7 @@ pub(crate) fn of_name(name: &str) -> Option<&'static Encoding> {
 }
 
 /// The name of an encoding in messages.
-pub(super) fn name_of(encoding: &'static Encoding) -> &'static str {
+pub(crate) fn name_of(encoding: &'static Encoding) -> &'static str {
     if encoding == WINDOWS_1252 { "Latin-1 (windows-1252)" } else { encoding.name() }
 }
 

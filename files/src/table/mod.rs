@@ -5,10 +5,11 @@
 //! - `request`: what a test requires of its file; `columns`, `required`: roles of columns; `fill`: readings
 //!   from rows;
 //! - [`memory`]: columns in memory in place of a file; `missing`: readings that they lack;
-//! - `lines`, `encoding`, `row`, `number`: lines of a text, rows and cells.
+//! - `lines`, `encoding`, `comment`, `row`, `number`: lines of a text, rows and cells.
 
 mod ballbar_xml;
 pub(crate) mod columns;
+pub(crate) mod comment;
 pub mod csv;
 mod duplicates;
 pub(crate) mod encoding;

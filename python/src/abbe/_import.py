@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -79,6 +80,11 @@ def import_readings(
         If another file beside `session` has the name of one that would be written. Nothing is written then.
     IdentificationError
         If the readings contradict the machine.
+
+    Warns
+    -----
+    UserWarning
+        Of units that were guessed, and of rows and columns that are not read.
     """
     if isinstance(files, (str, os.PathLike)):
         files = [files]
@@ -96,6 +102,9 @@ def import_readings(
         allow_outside,
         allow_implausible,
     )
+    # What was guessed and what is not read.
+    for warning in json.loads(result)["warnings"]:
+        warnings.warn(warning, stacklevel=2)
     folder = Path(session).parent if session is not None else Path(out or ".")
     folder.mkdir(parents=True, exist_ok=True)
     present = [Path(file).resolve() for file in files]

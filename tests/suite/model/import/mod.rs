@@ -15,6 +15,7 @@ use serde_json::Value;
 mod joints;
 mod names;
 mod stated;
+mod units;
 
 use crate::suite::{abbe, ready, text, workspace};
 
