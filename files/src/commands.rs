@@ -18,6 +18,7 @@ use super::quantity::Unit;
 use super::stamp::FileStamp;
 use super::store::{OpenFile, Store};
 use super::table::columns::Role;
+use super::table::comment::is_comment;
 use super::table::number;
 use super::table::request::Format;
 
@@ -86,6 +87,7 @@ pub struct Block {
 
 /// A file of commanded positions.
 pub struct CommandFile {
+    warning: Option<String>,
     path: PathBuf,
     stamp: FileStamp,
     reader: csv::Reader<Bounded>,
@@ -116,11 +118,10 @@ impl CommandFile {
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .trim(csv::Trim::All)
-            .comment(Some(b'#'))
             .flexible(true)
             .from_reader(Bounded { opened, left: LONGEST_ROW });
         let mut header = StringRecord::new();
-        let found = reader.read_record(&mut header).map_err(|cause| unreadable(path, &cause))?;
+        let found = next_record(&mut reader, &mut header, path)?;
         let fault = |message: String, help: String| ModelError::Input {
             location: Location::line(path, header.position().map_or(1, |place| place.line() as usize)),
             message,
@@ -176,7 +177,31 @@ impl CommandFile {
             };
             return Err(fault(message.into(), expected()));
         }
+        // An axis whose positions stand in a column without a unit would be taken to be elsewhere.
+        let is_read = |axis: usize| {
+            meanings.iter().any(|meaning| matches!(meaning, Meaning::Of(Role::Axis(own, _)) if *own == axis))
+        };
+        let unread =
+            header.iter().zip(&meanings).filter(|(_, meaning)| **meaning == Meaning::Other).map(|(name, _)| name);
+        let nameless = unread.clone().find_map(|name| {
+            let same =
+                |axis: &usize| machine.axes[*axis].name.eq_ignore_ascii_case(name.trim_start_matches('\u{feff}'));
+            (0..machine.axes.len()).find(same).filter(|axis| !is_read(*axis)).map(|axis| (name, axis))
+        });
+        if let Some((name, axis)) = nameless {
+            let axis = &machine.axes[axis];
+            return Err(fault(
+                format!("column `{name}` has the name of axis {}, and no unit", axis.name),
+                format!("call it `{}` if it holds its positions, and otherwise by another name", axis.column("")),
+            ));
+        }
+        let unread: Vec<&str> = unread.filter(|name| !name.is_empty()).collect();
+        let line = header.position().map_or(1, |place| place.line());
+        let warning = (!unread.is_empty()).then(|| {
+            format!("{}:{line}: columns that are not read, and kept as they are: {}", path.display(), unread.join(", "))
+        });
         Ok(CommandFile {
+            warning,
             path: path.to_path_buf(),
             stamp: FileStamp::of(path, state),
             reader,
@@ -194,6 +219,11 @@ impl CommandFile {
     /// The file; the bytes that were read are known after the last block.
     pub fn stamp(&self) -> &FileStamp {
         &self.stamp
+    }
+
+    /// The columns that nothing is read from, with file and line.
+    pub fn warning(&self) -> Option<&str> {
+        self.warning.as_deref()
     }
 
     /// The names of the columns.
@@ -252,7 +282,7 @@ impl CommandFile {
         let mut leading = 0;
         while block.cells.len() < most {
             self.reader.get_mut().left = LONGEST_ROW;
-            if !self.reader.read_record(&mut record).map_err(|cause| unreadable(&self.path, &cause))? {
+            if !next_record(&mut self.reader, &mut record, &self.path)? {
                 self.stamp.finish(&self.reader.get_ref().opened)?;
                 break;
             }
@@ -348,6 +378,16 @@ struct Row {
 impl Row {
     fn not_a_number(axes: usize, run: i64) -> Row {
         Row { positions: vec![f64::NAN; axes], time_s: f64::NAN, drivers: Vec::new(), run, pose: [f64::NAN; 10] }
+    }
+}
+
+/// Reads the next row that is no comment; `false` at the end.
+fn next_record(reader: &mut csv::Reader<Bounded>, record: &mut StringRecord, path: &Path) -> Result<bool, ModelError> {
+    loop {
+        let found = reader.read_record(record).map_err(|cause| unreadable(path, &cause))?;
+        if !found || !record.get(0).is_some_and(is_comment) {
+            return Ok(found);
+        }
     }
 }
 

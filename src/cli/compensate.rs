@@ -84,7 +84,8 @@ pub fn run(arguments: &CompensateArguments) -> Result<(), Failure> {
         return Err(Failure::Interrupted("interrupted; nothing is written".into()));
     }
     written?;
-    let report = present::report(&arguments.out, &summary, correction.aim);
+    let mut report = present::report(&arguments.out, &summary, correction.aim);
+    report.warnings.extend(file.warning().map(str::to_string));
     arguments.output.put(&outputs, &report, &summary, &Read::files(source.stamp.iter().chain([file.stamp()])))
 }
 

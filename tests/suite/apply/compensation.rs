@@ -291,3 +291,39 @@ fn a_stationary_axis_has_no_table() {
     );
     assert!(!out.exists());
 }
+
+/// Columns that nothing is read from are told, and one with the name of an axis alone is refused: the axis would be taken
+/// to stand at 0. A row that begins with the error of a cell is a row.
+#[test]
+fn columns_and_rows_of_commands_are_read_or_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let session = super::super::ready("hermle-c600u/measured/session.toml");
+    let [model, commands, out] = ["m.json", "c.csv", "o.csv"].map(|name| folder.path().join(name));
+    assert!(abbe(&["fit", text(&session), "--save", text(&model), "--quiet"]).status.success());
+    let run = |contents: &str| {
+        std::fs::write(&commands, contents).unwrap();
+        let run = abbe(&["compensate", text(&model), text(&commands), "--out", text(&out), "--quiet"]);
+        let said = String::from_utf8_lossy(&run.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+        (run.status.code(), said)
+    };
+    let (code, said) = run("a_deg,c_deg,X,Y,Z\n30,45,10,20,30\n");
+    assert!(code == Some(1) && !out.exists(), "{said}");
+    assert!(
+        said.contains("c.csv:1: column `X` has the name of axis X, and no unit") && said.contains("`x_mm`"),
+        "{said}"
+    );
+    let (code, said) =
+        run("# commands\na_deg,c_deg,x_mm,y_mm,z_mm,X,feed\n30,45,10,20,30,1,2\n#REF!,45,10,20,30,1,2\n# end\n");
+    assert_eq!(code, Some(0), "{said}");
+    assert!(
+        said.contains("warning: ")
+            && said.contains("c.csv:2: columns that are not read, and kept as they are: X, feed"),
+        "{said}"
+    );
+    let written = std::fs::read_to_string(&out).unwrap();
+    assert_eq!(written.lines().count(), 3, "{written}");
+    assert!(
+        written.lines().nth(2).is_some_and(|line| line.starts_with("#REF!,45") && line.ends_with("not-a-number")),
+        "{written}"
+    );
+}
