@@ -54,7 +54,7 @@ pub mod template;
 mod with_readings;
 
 pub use self::access::ReadOptions;
-pub use self::read::{machine, machine_of, session, session_of, session_with_sources, text};
+pub use self::read::{foreign_text, machine, machine_of, session, session_of, session_with_sources, text};
 pub use self::source::Source;
 pub use self::source_map::SourceMap;
 pub use self::with_readings::{Changes, with_readings};

@@ -36,6 +36,14 @@ pub fn text(path: &Path, what: &str) -> Result<Source, ModelError> {
     Source::read(&Store::Disk, path, what)
 }
 
+/// As [`text()`], of a file of another program in its own encoding, such as a URDF.
+///
+/// # Errors
+/// If the file cannot be read, or is too large.
+pub fn foreign_text(path: &Path, what: &str) -> Result<Source, ModelError> {
+    Source::read_foreign(&Store::Disk, path, what)
+}
+
 /// Reads a machine file.
 ///
 /// # Errors

@@ -10,6 +10,7 @@ use abbe_model::document::node::{Entry, Node, Value};
 use abbe_model::document::schema;
 use abbe_model::document::{LIST, from_node};
 use abbe_model::error::{Location, ModelError};
+use encoding_rs::{Encoding, UTF_8};
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde_json::value::RawValue;
@@ -19,11 +20,14 @@ use crate::node;
 use crate::spelling::known_names;
 use crate::stamp::FileStamp;
 use crate::store::Store;
+use crate::table::encoding;
 
 /// Largest size of a machine or session file, bytes.
 const MAX_BYTES: u64 = 8 << 20;
 /// Largest nesting depth that the TOML parser accepts.
 const MAX_DEPTH: usize = 80;
+/// Bytes in which an XML declaration is looked for.
+const MAX_DECLARATION: usize = 200;
 
 /// The text of a file, read once: a session, a machine, a model, a study, a file of values.
 #[derive(Clone, Debug)]
@@ -46,6 +50,30 @@ impl Source {
     /// If the file cannot be read or is not such a text, with its name and what to do.
     pub fn read(store: &Store, file: &Path, what: &str) -> Result<Source, ModelError> {
         let (text, stamp) = text(store, file, what)?;
+        Ok(Source { stamp: Some(stamp), ..Source::new(file, &text) })
+    }
+
+    /// As [`Source::read`], of a file of another program: UTF-8, UTF-16, or the encoding that its XML declaration states, and
+    /// otherwise Latin-1. A declaration then states UTF-8, the encoding of the text in memory.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or is too large.
+    pub fn read_foreign(store: &Store, file: &Path, what: &str) -> Result<Source, ModelError> {
+        let (bytes, stamp) = bytes(store, file, what)?;
+        let (found, mark) = encoding::of_start(&bytes, None);
+        let declared = declared(&bytes[mark..]);
+        let stated = found.or_else(|| std::str::from_utf8(&bytes).is_err().then_some(declared).flatten());
+        let text = match encoding::decode(&bytes[mark..], stated) {
+            Ok((text, encoding)) if encoding != UTF_8 => stating_utf_8(&text),
+            Ok((text, _)) => text.into_owned(),
+            Err(encoding) => {
+                return Err(ModelError::Input {
+                    location: Location::file(file),
+                    message: format!("{what} is not valid {}", encoding::name_of(encoding)),
+                    help: Some("save the file as UTF-8".into()),
+                });
+            }
+        };
         Ok(Source { stamp: Some(stamp), ..Source::new(file, &text) })
     }
 
@@ -264,9 +292,44 @@ fn place(node: &Node, entry: Option<&Entry>) -> Range<usize> {
     }
 }
 
+/// The place of the encoding in the XML declaration of a text, if it has one.
+fn place_of_encoding(text: &str) -> Option<Range<usize>> {
+    let declaration = text.strip_prefix("<?xml").and_then(|rest| rest.split("?>").next())?;
+    let key = "<?xml".len() + declaration.find("encoding")? + "encoding".len();
+    let start = key + text[key..].find(['"', '\''])? + 1;
+    let quote = text[..start].chars().next_back()?;
+    (start < "<?xml".len() + declaration.len()).then_some(start..start + text[start..].find(quote)?)
+}
+
+/// The encoding that the XML declaration of bytes states.
+fn declared(bytes: &[u8]) -> Option<&'static Encoding> {
+    let start = String::from_utf8_lossy(&bytes[..bytes.len().min(MAX_DECLARATION)]);
+    encoding::of_name(&start[place_of_encoding(&start)?])
+}
+
+/// The text with UTF-8 as the encoding of its XML declaration.
+fn stating_utf_8(text: &str) -> String {
+    let mut text = text.to_string();
+    if let Some(place) = place_of_encoding(&text) {
+        text.replace_range(place, "UTF-8");
+    }
+    text
+}
+
 /// Reads a text file: UTF-8 with or without byte order mark, of a limited size, unchanged while it is read. `what` names
 /// its content in messages.
 pub(crate) fn text(store: &Store, file: &Path, what: &str) -> Result<(String, FileStamp), ModelError> {
+    let (bytes, stamp) = bytes(store, file, what)?;
+    let text = String::from_utf8(bytes).map_err(|cause| ModelError::Input {
+        location: Location::file(file),
+        message: format!("byte {} is not UTF-8, the encoding of TOML", cause.utf8_error().valid_up_to() + 1),
+        help: Some("save the file as UTF-8".into()),
+    })?;
+    Ok((text, stamp))
+}
+
+/// The bytes of a file of a limited size, unchanged while it is read.
+fn bytes(store: &Store, file: &Path, what: &str) -> Result<(Vec<u8>, FileStamp), ModelError> {
     let fault = |message: String, help: &str| ModelError::Input {
         location: Location::file(file),
         message,
@@ -292,11 +355,5 @@ pub(crate) fn text(store: &Store, file: &Path, what: &str) -> Result<(String, Fi
         ));
     }
     stamp.finish(&opened)?;
-    let text = String::from_utf8(bytes).map_err(|cause| {
-        fault(
-            format!("byte {} is not UTF-8, the encoding of TOML", cause.utf8_error().valid_up_to() + 1),
-            "save the file as UTF-8",
-        )
-    })?;
-    Ok((text, stamp))
+    Ok((bytes, stamp))
 }

@@ -5,7 +5,7 @@
 use crate::error::ModelError;
 
 /// Largest number of axes in a chain.
-const MAX_AXES: usize = 64;
+pub const MAX_AXES: usize = 64;
 
 /// The axes of a structural code, in the order of the code.
 ///

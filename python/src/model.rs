@@ -110,8 +110,10 @@ impl Model {
             convention: Convention::of_word(convention).ok_or_else(|| {
                 Failed::argument(format!("there is no convention `{convention}`"), "standard or modified")
             })?,
-            dh: dh.map(|file| files::text(&file, "the table")).transpose()?,
-            patch: patch.map(|file| files::text(&file, "the URDF file").map(|source| (source, tip))).transpose()?,
+            dh: dh.map(|file| files::foreign_text(&file, "the table")).transpose()?,
+            patch: patch
+                .map(|file| files::foreign_text(&file, "the URDF file").map(|source| (source, tip)))
+                .transpose()?,
             places,
             travel: travel.iter().try_fold(measured, |all, (axis, range)| all.with(&self.model, axis, *range))?,
         };

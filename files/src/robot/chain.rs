@@ -1,6 +1,10 @@
 //! A serial chain of joints at its zero position.
 
+use std::path::Path;
+
 use abbe_model::axis::AxisKind;
+use abbe_model::code::MAX_AXES;
+use abbe_model::error::{Location, ModelError};
 use nalgebra::{Isometry3, Vector3};
 
 /// A movable joint, with all joints at zero.
@@ -36,6 +40,19 @@ pub struct Chain {
 }
 
 impl Chain {
+    /// Refuses a chain with more joints than a machine has axes, before anything is made of it.
+    pub(super) fn within_limit(self, file: &Path) -> Result<Chain, ModelError> {
+        let joints = self.joints.len();
+        if joints <= MAX_AXES {
+            return Ok(self);
+        }
+        Err(ModelError::Input {
+            location: Location::file(file),
+            message: format!("a chain of {joints} joints; the limit is {MAX_AXES} axes"),
+            help: Some("name the file of one serial chain".into()),
+        })
+    }
+
     /// The axis of a joint in the frame of the base: a point of it in mm, and its direction.
     pub fn line(&self, joint: usize) -> (Vector3<f64>, Vector3<f64>) {
         let joint = &self.joints[joint];

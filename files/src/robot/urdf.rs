@@ -123,7 +123,9 @@ pub fn read(source: &Source) -> Result<Urdf, ModelError> {
         let name = element.name().as_ref().to_string();
         let whole = |message: String| fault(before, message, "correct the file");
         let text_of = |key: &str| attribute(&element, key);
-        match (path.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().as_slice(), name.as_str()) {
+        // What lies deeper is not looked at.
+        let above: Vec<&str> = path.iter().take(3).map(|(name, _)| name.as_str()).collect();
+        match (above.as_slice(), name.as_str()) {
             ([], "robot") => urdf.name = text_of("name").map_err(whole)?.unwrap_or_default(),
             ([], _) => {
                 return Err(fault(before, format!("the first element is <{name}>, not <robot>"), "name a URDF file"));
@@ -425,6 +427,6 @@ impl Urdf {
             joints.push(Joint { name: joint.name.clone(), kind, pose: frame, direction: joint.axis, travel });
         }
         let base = path.first().map_or_else(String::new, |joint| joint.parent.clone());
-        Ok(Chain { name: self.name.clone(), base, flange, joints, end: frame, assumed })
+        Chain { name: self.name.clone(), base, flange, joints, end: frame, assumed }.within_limit(file)
     }
 }

@@ -3,7 +3,7 @@
 //! The first row that is not empty is the header; a row whose first cell begins with `#` is a comment. The display
 //! format of a cell is ignored: a number is read with all its digits, a formula by its last value.
 
-use std::io::{Cursor, Read};
+use std::io::{Cursor, Read, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
@@ -11,6 +11,7 @@ use abbe_model::error::{Location, ModelError};
 use calamine::{Data, Error, Ods, Reader, Sheets, Xls, Xlsb, Xlsx, XlsxError, open_workbook_from_rs};
 use zip::ZipArchive;
 
+use super::comment::is_comment;
 use super::format::{Content, DataFormat, Rows, Table, has_extension};
 use super::request::{Format, Request};
 use super::row::Row;
@@ -50,8 +51,12 @@ const MAX_BYTES: u64 = 64 << 20;
 const MAX_UNPACKED: u64 = 256 << 20;
 /// Largest number of columns.
 const MAX_COLUMNS: u32 = 1000;
+/// Largest number of filled cells. Each takes about a hundred bytes of memory.
+const MAX_FILLED: usize = 5_000_000;
 /// Largest number of cells of the rectangle around all filled cells.
 const MAX_CELLS: usize = 20_000_000;
+/// Largest text between two tags of a part, bytes: a cell has at most 32,767 characters.
+const MAX_TEXT: usize = 1 << 20;
 
 /// The rows of a sheet, and the state of the file.
 fn rows(store: &Store, file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>), ModelError> {
@@ -78,12 +83,9 @@ fn rows(store: &Store, file: &Path, format: &Format) -> Result<(FileStamp, Vec<R
     opened.by_ref().take(MAX_BYTES + 1).read_to_end(&mut contents).map_err(|cause| broken(cause.into()))?;
     let stamp = FileStamp::of(file, found);
     stamp.finish(&opened)?;
-    if unpacks_beyond(&contents, MAX_UNPACKED) {
-        return Err(fault(
-            format!("a spreadsheet that unpacks to more than {MAX_UNPACKED} bytes, which is the limit"),
-            "export it as CSV".into(),
-        ));
-    }
+    unpacks_within(&contents, MAX_UNPACKED).map_err(|message| {
+        fault(format!("a spreadsheet that {message}, which is the limit"), "export it as CSV".into())
+    })?;
     let mut book = catch_panic(|| workbook(file, contents)).map_err(broken)?;
     let names = book.sheet_names();
     let sheets_to_read: Vec<String> = match &format.sheet {
@@ -130,23 +132,50 @@ fn workbook(file: &Path, contents: Vec<u8>) -> Result<Book, Error> {
     })
 }
 
-/// Whether the parts of a ZIP file unpack to more than this number of bytes. The sizes stated in the file are not
-/// trusted.
-fn unpacks_beyond(contents: &[u8], most: u64) -> bool {
+/// Unpacks the parts of a ZIP file and forgets them: whether they are within the limits of their size and of their
+/// texts. The sizes stated in the file are not trusted. The error says what exceeds a limit.
+fn unpacks_within(contents: &[u8], most: u64) -> Result<(), String> {
     // A file that is not ZIP is not packed.
-    let Ok(mut archive) = ZipArchive::new(Cursor::new(contents)) else { return false };
+    let Ok(mut archive) = ZipArchive::new(Cursor::new(contents)) else { return Ok(()) };
     let mut left = most;
     for part in 0..archive.len() {
         let Ok(part) = archive.by_index(part) else {
             continue;
         };
-        let read = std::io::copy(&mut part.take(left + 1), &mut std::io::sink()).unwrap_or(0);
+        let is_xml = part.name().is_ok_and(|name| has_extension(Path::new(name.as_ref()), &["xml"]));
+        let mut texts = Texts::default();
+        let read = std::io::copy(&mut part.take(left + 1), &mut texts).unwrap_or(0);
         if read > left {
-            return true;
+            return Err(format!("unpacks to more than {most} bytes"));
+        }
+        if is_xml && texts.longest > MAX_TEXT {
+            return Err(format!("has a text of more than {MAX_TEXT} bytes"));
         }
         left -= read;
     }
-    false
+    Ok(())
+}
+
+/// The longest text between two tags of XML that is written to it.
+#[derive(Default)]
+struct Texts {
+    /// Bytes since the last tag began.
+    since: usize,
+    longest: usize,
+}
+
+impl Write for Texts {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        for (number, part) in bytes.split(|byte| *byte == b'<').enumerate() {
+            self.since = part.len() + if number == 0 { self.since } else { 0 };
+            self.longest = self.longest.max(self.since);
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
 }
 
 /// Calls the library. It may panic on a contradictory file (a row number beyond 32 bits, in builds with overflow
@@ -165,6 +194,12 @@ type PlacedCell = (u32, u32, Data);
 /// not fit in memory.
 fn cells(book: &mut Book, name: &str) -> Result<Vec<PlacedCell>, Error> {
     let mut cells = Vec::new();
+    let within = |cells: &Vec<PlacedCell>| match cells.len() > MAX_FILLED {
+        true => Err(Error::from(std::io::Error::other(format!(
+            "it has more than {MAX_FILLED} filled cells, which is the limit"
+        )))),
+        false => Ok(()),
+    };
     match book {
         Sheets::Xlsx(book) => {
             let mut reader = match book.worksheet_cells_reader(name) {
@@ -174,6 +209,7 @@ fn cells(book: &mut Book, name: &str) -> Result<Vec<PlacedCell>, Error> {
             while let Some(cell) = reader.next_cell()? {
                 let (row, column) = cell.get_position();
                 cells.push((row, column, Data::from(cell.get_value().clone())));
+                within(&cells)?;
             }
         }
         Sheets::Xlsb(book) => {
@@ -181,13 +217,16 @@ fn cells(book: &mut Book, name: &str) -> Result<Vec<PlacedCell>, Error> {
             while let Some(cell) = reader.next_cell()? {
                 let (row, column) = cell.get_position();
                 cells.push((row, column, Data::from(cell.get_value().clone())));
+                within(&cells)?;
             }
         }
         book => {
             let range = book.worksheet_range(name)?;
             let (top, left) = range.start().unwrap_or_default();
             let used = range.used_cells();
-            cells.extend(used.map(|(row, column, cell)| (top + row as u32, left + column as u32, cell.clone())));
+            let placed = used.map(|(row, column, cell)| (top + row as u32, left + column as u32, cell.clone()));
+            cells.extend(placed.take(MAX_FILLED + 1));
+            within(&cells)?;
         }
     }
     cells.retain(|(_, _, cell)| *cell != Data::Empty);
@@ -216,7 +255,7 @@ fn by_row(mut cells: Vec<PlacedCell>, format: &Format) -> Result<Vec<Row>, (Stri
     let mut rows: Vec<Row> = Vec::new();
     for of_row in cells.chunk_by(|(row, ..), (next, ..)| row == next) {
         let first = of_row.iter().find(|(_, column, _)| *column == left);
-        if matches!(first, Some((_, _, Data::String(text))) if text.trim_start().starts_with('#')) {
+        if matches!(first, Some((_, _, Data::String(text))) if is_comment(text)) {
             continue;
         }
         if (rows.len() + 1) * width > MAX_CELLS {

@@ -103,11 +103,20 @@ fn in_short_runs(runs: &[Range<usize>], keys: &RepeatKeys, values: &[f64], sigma
         repeats.entry(keys.of_row(row)).or_default().push(row);
     }
     let repeats_of = |row: usize| repeats.get(keys.of_row(row)).map_or(&[][..], Vec::as_slice);
+    let ordered: HashMap<&[i64], Ordered> =
+        repeats.iter().map(|(key, rows)| (*key, Ordered::of(rows.iter().map(|row| values[*row])))).collect();
+    let beyond_repeats = |row: usize| {
+        let level = match repeats_of(row).len() {
+            // Of two others their mean.
+            3 => 0.5 * repeats_of(row).iter().filter(|other| **other != row).map(|other| values[*other]).sum::<f64>(),
+            _ => ordered.get(keys.of_row(row))?.median_without(values[row])?,
+        };
+        Some(values[row] - level)
+    };
     let mut differences = vec![f64::NAN; values.len()];
     let mut bends = vec![0.0; values.len()];
     for run in runs {
-        let of_run: Vec<(usize, f64)> =
-            run.clone().filter_map(|row| Some((row, beyond_repeats(row, repeats_of(row), values)?))).collect();
+        let of_run: Vec<(usize, f64)> = run.clone().filter_map(|row| Some((row, beyond_repeats(row)?))).collect();
         if of_run.len() >= MIN_REPEATED {
             // The run as a whole may differ from its repeats, as by a drift.
             let level = median(&mut of_run.iter().map(|(_, difference)| *difference).collect::<Vec<f64>>());
@@ -122,11 +131,13 @@ fn in_short_runs(runs: &[Range<usize>], keys: &RepeatKeys, values: &[f64], sigma
         return Vec::new();
     }
     let limit = OUTLIER_ALONG_RUN * robust_deviation(&known).max(sigma_mm);
+    let largest = |rows: &Vec<usize>| rows.iter().map(|row| differences[*row].abs()).fold(0.0, f64::max);
+    let largest: HashMap<&[i64], f64> = repeats.iter().map(|(key, rows)| (*key, largest(rows))).collect();
     // The worst of its repeats. Two differ from each other by the same: of these it is the one that its neighbours
     // contradict, and either if they contradict both.
     let is_worst = |row: usize| match *repeats_of(row) {
         [one, other] => bends[row] >= 0.5 * bends[if one == row { other } else { one }],
-        ref all => !all.iter().any(|other| differences[*other].abs() > differences[row].abs()),
+        _ => largest.get(keys.of_row(row)).is_none_or(|largest| differences[row].abs() >= *largest),
     };
     let in_run = |run: &Range<usize>| -> Vec<usize> {
         let is_alone = |row: &usize| is_isolated(&differences[run.clone()], row - run.start);
@@ -135,15 +146,22 @@ fn in_short_runs(runs: &[Range<usize>], keys: &RepeatKeys, values: &[f64], sigma
     runs.iter().flat_map(in_run).collect()
 }
 
-/// The value of a row less the median of its other repeats, of two their mean. `None` without other repeats.
-fn beyond_repeats(row: usize, repeats: &[usize], values: &[f64]) -> Option<f64> {
-    let mut others: Vec<f64> = repeats.iter().filter(|other| **other != row).map(|other| values[*other]).collect();
-    let level = match others[..] {
-        [] => return None,
-        [one, other] => 0.5 * (one + other),
-        _ => median(&mut others),
-    };
-    Some(values[row] - level)
+/// The values of repeats in their order, from which the median of the others of each follows at once.
+struct Ordered(Vec<f64>);
+
+impl Ordered {
+    fn of(values: impl Iterator<Item = f64>) -> Ordered {
+        let mut values: Vec<f64> = values.collect();
+        values.sort_unstable_by(f64::total_cmp);
+        Ordered(values)
+    }
+
+    /// The median of all but one, which is among them; `None` if there is no other.
+    fn median_without(&self, value: f64) -> Option<f64> {
+        let middle = self.0.len().checked_sub(1)? / 2;
+        let place = self.0.partition_point(|other| other.total_cmp(&value).is_lt());
+        self.0.get(if middle < place { middle } else { middle + 1 }).copied()
+    }
 }
 
 /// Whether both neighbours of a value are less than half as large. An end of the list has one; NaN counts as none.
@@ -227,10 +245,12 @@ fn retain_unrepeated(rows: &mut Vec<(usize, f64)>, readings: &Readings, deviatio
             repeats.push(row);
         }
     }
+    let ordered: HashMap<&[i64], Ordered> = (repeats.into_iter())
+        .map(|(key, rows)| (key, Ordered::of(rows.into_iter().map(|row| deviations[row]))))
+        .collect();
     rows.retain(|(row, limit)| {
-        let others = repeats[keys.of_row(*row)].iter().filter(|other| *other != row);
-        let mut others: Vec<f64> = others.map(|other| deviations[*other]).collect();
-        others.is_empty() || (deviations[*row] - median(&mut others)).abs() > *limit
+        let others = ordered.get(keys.of_row(*row)).and_then(|ordered| ordered.median_without(deviations[*row]));
+        others.is_none_or(|median| (deviations[*row] - median).abs() > *limit)
     });
 }
 
@@ -336,6 +356,23 @@ mod tests {
         let residual: Vec<f64> = (0..rows).map(|row| noise(row) + structure(row) + change(row)).collect();
         let rejected = reject_along_runs(&readings, &residual, 1, 3e-4);
         (0..rows).filter(|row| rejected[*row]).collect()
+    }
+
+    #[test]
+    fn the_median_of_the_others_is_that_of_a_list_without_one() {
+        // All lists of one to five small numbers, ties included.
+        for length in 1..6_u32 {
+            for code in 0..3_usize.pow(length) {
+                let values: Vec<f64> = (0..length).map(|place| (code / 3_usize.pow(place) % 3) as f64).collect();
+                let ordered = Ordered::of(values.iter().copied());
+                for place in 0..values.len() {
+                    let mut others = values.clone();
+                    others.remove(place);
+                    let expected = (!others.is_empty()).then(|| median(&mut others));
+                    assert_eq!(ordered.median_without(values[place]), expected, "{values:?} without {place}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -145,17 +145,15 @@ impl Trends {
         let repeats = group.len() as f64;
         let mut own = 0.0;
         // The trends' part of Σ_ts: for each run, the squared norm of the sum of its rows' terms.
-        let mut sums: Vec<(Option<usize>, [f64; TERMS])> = Vec::new();
+        let mut sums: BTreeMap<Option<usize>, [f64; TERMS]> = BTreeMap::new();
         for row in group {
             let run_of_row = self.run(*row);
             let terms = run_of_row.map_or([0.0; TERMS], |run| self.terms_in(run, *row));
             own += terms.iter().map(|q| q * q).sum::<f64>();
-            match sums.iter_mut().find(|(run, _)| *run == run_of_row) {
-                Some((_, sum)) => sum.iter_mut().zip(&terms).for_each(|(sum, q)| *sum += q),
-                None => sums.push((run_of_row, terms)),
-            }
+            let sum = sums.entry(run_of_row).or_insert([0.0; TERMS]);
+            sum.iter_mut().zip(&terms).for_each(|(sum, q)| *sum += q);
         }
-        let of_trends: f64 = sums.iter().flat_map(|(_, sum)| sum).map(|q| q * q).sum();
+        let of_trends: f64 = sums.values().flatten().map(|q| q * q).sum();
         (repeats - own) - (repeats - of_trends) / repeats
     }
 }

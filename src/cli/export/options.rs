@@ -13,8 +13,8 @@ use crate::cli::values;
 impl ExportArguments {
     /// The options for a model; the files that they name are read.
     pub fn options(&self, model: &IdentifiedModel) -> Result<ExportOptions, Failure> {
-        let patch = self.patch.as_ref().map(|file| files::text(file, "the URDF file")).transpose()?;
-        let dh = self.dh.as_ref().map(|file| files::text(file, "the table")).transpose()?;
+        let patch = self.patch.as_ref().map(|file| files::foreign_text(file, "the URDF file")).transpose()?;
+        let dh = self.dh.as_ref().map(|file| files::foreign_text(file, "the table")).transpose()?;
         Ok(ExportOptions {
             convention: self.convention,
             dh,

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use abbe::files::foreign_text;
 use abbe::files::robot::dh::Convention;
 use abbe::files::robot::{self, Measured, dh, urdf};
-use abbe::files::text;
 use clap::Args;
 
 use crate::cli::failure::Failure;
@@ -57,10 +57,10 @@ impl RobotArguments {
     /// The files of the robot; none without one.
     pub fn files(&self) -> Result<Vec<NewFile>, Failure> {
         let chain = match (&self.from_urdf, &self.from_dh, self.convention) {
-            (Some(file), ..) => urdf::read(&text(file, "the URDF file")?)?.chain(file, self.tip.as_deref())?,
+            (Some(file), ..) => urdf::read(&foreign_text(file, "the URDF file")?)?.chain(file, self.tip.as_deref())?,
             (None, Some(file), Some(convention)) => {
                 let name = file.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-                dh::read(&text(file, "the table")?, convention)?.chain(&name)
+                dh::read(&foreign_text(file, "the table")?, convention)?.chain(&name)
             }
             _ => return Ok(Vec::new()),
         };

@@ -42,7 +42,12 @@ pub(super) struct Columns {
     angle: Unit,
     limit: Unit,
     length: Unit,
+    /// The columns of an exported table that are not of the chain: its uncertainties and its nominal values.
+    pub unread: Vec<String>,
 }
+
+/// First characters of the columns that an exported table has beside its parameters.
+const BESIDE: [&str; 2] = ["u_", "nominal_"];
 
 const DEGREE: Unit = Unit::of_own("deg");
 const RADIAN: Unit = Unit::of_own("rad");
@@ -52,8 +57,13 @@ const MILLIMETRE: Unit = Unit::of_own("mm");
 impl Columns {
     /// The columns of a line of names.
     pub fn of(names: &[String]) -> Result<Columns, Fault> {
-        let mut columns = Columns { places: Vec::new(), angle: DEGREE, limit: DEGREE, length: MILLIMETRE };
+        let mut columns =
+            Columns { places: Vec::new(), angle: DEGREE, limit: DEGREE, length: MILLIMETRE, unread: Vec::new() };
         for (place, name) in names.iter().enumerate() {
+            if BESIDE.iter().any(|beside| name.starts_with(beside)) {
+                columns.unread.push(name.clone());
+                continue;
+            }
             let named = unit::split(name);
             let plain: String = named.base.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
             let known = COLUMNS.iter().find(|(_, words)| words.contains(&plain.trim_end_matches(char::is_numeric)));

@@ -14,6 +14,7 @@ mod columns;
 mod row;
 
 use abbe_model::axis::AxisKind;
+use abbe_model::code::MAX_AXES;
 use abbe_model::error::{Location, ModelError};
 use abbe_model::instrument::Fault;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -24,6 +25,7 @@ use self::columns::{Columns, NAMES};
 use self::row::RowRead;
 use super::chain::{Chain, Joint};
 use crate::source::Source;
+use crate::table::comment::is_comment;
 
 /// The order of the four motions of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
@@ -86,7 +88,7 @@ pub struct Table {
 pub fn read(source: &Source, convention: Convention) -> Result<Table, ModelError> {
     let lines: Vec<(usize, &str)> = (source.text.lines().enumerate())
         .map(|(line, text)| (line + 1, text))
-        .filter(|(_, text)| !text.trim().is_empty() && !text.trim_start().starts_with('#'))
+        .filter(|(_, text)| !text.trim().is_empty() && !is_comment(text))
         .collect();
     let at = |line: usize| {
         move |(message, help): Fault| ModelError::Input {
@@ -104,16 +106,39 @@ pub fn read(source: &Source, convention: Convention) -> Result<Table, ModelError
     let names = cells(header);
     let mut columns = Columns::of(&names).map_err(at(*header_line))?;
     let mut read: Vec<RowRead> = Vec::new();
+    let mut joints = 0;
     for (line, text) in rows {
         let cells = cells(text);
         if cells.len() != names.len() {
             let message = format!("a row of {} cells under {} names", cells.len(), names.len());
             return Err(at(*line)((message, "complete the row".into())));
         }
-        let number = read.iter().filter(|row: &&RowRead| row.kind.is_some()).count() + 1;
-        read.push(RowRead::of(|own| columns.place(own), &cells, separator != ',', number, *line).map_err(at(*line))?);
+        let row = RowRead::of(|own| columns.place(own), &cells, separator != ',', joints + 1, *line);
+        read.push(row.map_err(at(*line))?);
+        joints += usize::from(read.last().is_some_and(|row| row.kind.is_some()));
+        if joints > MAX_AXES {
+            let message = format!("more than {MAX_AXES} joints, which is the limit of axes");
+            return Err(at(*line)((message, "a table has one row for each joint of a serial chain".into())));
+        }
     }
     let mut table = Table { convention, rows: Vec::new(), assumed: columns.decide(&read) };
+    if !columns.unread.is_empty() {
+        let (file, unread) = (source.file.display(), columns.unread.join(", "));
+        table.assumed.push(format!("{file}:{header_line}: columns that are not read: {unread}"));
+    }
+    // A variable has no number. Beside numbers of other joints it may be one that was forgotten.
+    let numbered = |own: &str| read.iter().any(|row| row.kind.is_some() && row.is_filled(own) && !row.value(own).moves);
+    for row in &read {
+        let mut blank = row.blank(|own| columns.place(own));
+        let variable = if row.kind == Some(AxisKind::Linear) { "d" } else { "theta" };
+        if row.kind.is_some() && columns.place(variable).is_some() && !row.is_filled(variable) && numbered(variable) {
+            blank.push(variable);
+        }
+        if !blank.is_empty() {
+            let (blank, file) = (blank.join("`, `"), source.file.display());
+            table.assumed.push(format!("{file}:{}: `{blank}` of joint `{}` is empty: 0", row.line, row.name));
+        }
+    }
     for row in &read {
         table.rows.push(columns.row(row, &mut table.assumed).map_err(at(row.line))?);
     }

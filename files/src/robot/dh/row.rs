@@ -79,6 +79,17 @@ impl RowRead {
         self.values.iter().any(|(name, _, is_filled)| *name == own && *is_filled)
     }
 
+    /// The parameters whose cells are empty although the table has their columns, and no joint moves them.
+    pub fn blank(&self, place: impl Fn(&str) -> Option<usize>) -> Vec<&'static str> {
+        let moved =
+            |own: &str| matches!((self.kind, own), (Some(AxisKind::Rotary), "theta") | (Some(AxisKind::Linear), "d"));
+        let has_limits = |own: &str| matches!(own, "lower" | "upper");
+        let blank = |(own, _, is_filled): &&(&'static str, Value, bool)| {
+            place(own).is_some() && !is_filled && !moved(own) && !has_limits(own)
+        };
+        self.values.iter().filter(blank).map(|(own, ..)| *own).collect()
+    }
+
     /// What a column of the row measures; `None` for the limits of a fixed row.
     pub fn dimension(&self, own: &str) -> Option<Dimension> {
         match (own, self.kind) {

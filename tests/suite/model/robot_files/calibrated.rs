@@ -147,9 +147,14 @@ fn calibrated_parameters_have_the_form_of_the_makers_table() {
             );
             assert!((1..4).all(|k| apart(own[k], calibrated[k]) < 0.5), "{name}: {calibrated:?}");
         }
+        // The exported table is one that `new` reads: the chain from the first frame to the last.
+        let again = ["--from-dh", text(&out), "--convention", convention];
+        let (again, again_folder) = created(place.path(), &format!("{name}-again"), &again);
+        let end = target_mm(&again_folder);
         let tool = target_mm(&folder);
         for q in positions(&machine, 100, 11) {
-            let mut frame = fixed(&found["calibrated"]["base"]);
+            let base = fixed(&found["calibrated"]["base"]);
+            let mut frame = base;
             for ([a, alpha, beta, theta, d], q) in calibrated.iter().zip(&q) {
                 let turn =
                     |axis: Vector3<f64>, degrees: f64| Rotation3::new(axis * degrees.to_radians()).to_homogeneous();
@@ -158,6 +163,9 @@ fn calibrated_parameters_have_the_form_of_the_makers_table() {
                 let about_z = turn(Vector3::z(), theta + q.to_degrees()) * shift(0.0, *d);
                 frame *= if modified { about_x * about_z } else { about_z * about_x };
             }
+            let of_chain = (base.try_inverse().unwrap() * frame).fixed_view::<3, 1>(0, 3).into_owned();
+            let off = (super::point_mm(&again, &q, end) - of_chain).norm();
+            assert!(off < 1e-6, "{name}: {off:e} mm");
             let point = (frame * fixed(&found["calibrated"]["tool"])).fixed_view::<3, 1>(0, 3).into_owned();
             let off = (point - with_errors(&own, &slots, &q, tool)).norm();
             assert!(off < 1e-6, "{name}: {off:e} mm");

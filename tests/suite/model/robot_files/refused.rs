@@ -2,6 +2,42 @@
 
 use super::{abbe, text, urdf};
 
+/// The limit of axes is looked at before a chain is made, and elements that lie deep cost no more than others.
+#[test]
+fn the_size_of_a_file_does_not_matter_before_its_limit() {
+    let place = tempfile::tempdir().unwrap();
+    let out = place.path().join("out");
+    let refused = |option: &str, contents: &str, expected: &str| {
+        let file = place.path().join("robot.csv");
+        std::fs::write(&file, contents).unwrap();
+        let began = std::time::Instant::now();
+        let mut asked = vec!["new", text(&out), option, text(&file)];
+        asked.extend(["--convention", "standard"].into_iter().filter(|_| option == "--from-dh"));
+        let output = abbe(&asked);
+        let found = String::from_utf8_lossy(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(output.status.code() == Some(1) && found.contains(expected), "{found}");
+        assert!(began.elapsed().as_secs() < 20, "{option}: {:?}", began.elapsed());
+    };
+    let rows = "100,90,20,0\n".repeat(10_000);
+    let table = format!("a_mm,alpha_deg,d_mm,theta_deg\n{rows}");
+    refused("--from-dh", &table, "robot.csv:66: more than 64 joints, which is the limit of axes");
+    let joint = |k: usize| {
+        format!(
+            "<link name=\"l{}\"/><joint name=\"j{k}\" type=\"revolute\"><parent link=\"l{k}\"/><child link=\"l{}\"/></joint>\n",
+            k + 1,
+            k + 1
+        )
+    };
+    let chain: String = (0..10_000).map(joint).collect();
+    refused(
+        "--from-urdf",
+        &format!("<robot name=\"r\"><link name=\"l0\"/>{chain}</robot>"),
+        "a chain of 10000 joints; the limit is 64 axes",
+    );
+    let deep = format!("<robot name=\"r\">{}{}</robot>", "<a>".repeat(500_000), "</a>".repeat(500_000));
+    refused("--from-urdf", &deep, "no movable joint");
+}
+
 #[test]
 fn a_urdf_that_is_no_serial_chain_is_refused_with_the_reason() {
     let place = tempfile::tempdir().unwrap();

@@ -35,6 +35,71 @@ fn parameters_are_read_in_the_units_of_their_columns() {
     }
 }
 
+/// Files of other programs are in their encodings: UTF-16 with a mark, Latin-1 as the XML declaration says or by its bytes.
+#[test]
+fn files_of_robots_are_read_in_their_encodings() {
+    let place = tempfile::tempdir().unwrap();
+    let utf_16 = |text: &str| -> Vec<u8> {
+        "\u{feff}".encode_utf16().chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect()
+    };
+    let latin_1 = |text: &str| -> Vec<u8> { text.chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect() };
+    let own = std::fs::read_to_string(urdf("ur5e")).unwrap();
+    let own = own.split_once("?>").map_or(own.as_str(), |(_, rest)| rest).trim_start();
+    let own = own.replacen("<robot", "<!-- Gelenk für Gelenk -->\n<robot", 1);
+    let of = |encoding: &str| format!("<?xml version=\"1.0\" encoding=\"{encoding}\"?>\n{own}");
+    let table = "joint,a_mm,alpha_deg,d_mm,theta_deg\nGrundgelenk für J1,0,90,254,q1\nzwei,508,0,0,q2\n";
+    let mut machines = Vec::new();
+    for (number, (option, contents)) in [
+        ("--from-urdf", of("UTF-8").into_bytes()),
+        ("--from-urdf", utf_16(&of("UTF-16"))),
+        ("--from-urdf", latin_1(&of("ISO-8859-1"))),
+        ("--from-urdf", latin_1(&own)),
+        ("--from-dh", table.as_bytes().to_vec()),
+        ("--from-dh", utf_16(table)),
+        ("--from-dh", latin_1(table)),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let file = place.path().join("robot");
+        std::fs::write(&file, contents).unwrap();
+        let mut asked = vec![option, text(&file)];
+        asked.extend(["--convention", "standard"].into_iter().filter(|_| option == "--from-dh"));
+        let (_, folder) = created(place.path(), &format!("e{number}"), &asked);
+        machines.push(std::fs::read_to_string(folder.join("machine.toml")).unwrap());
+    }
+    assert!(machines[..4].iter().all(|machine| *machine == machines[0]));
+    assert!(machines[4..].iter().all(|machine| *machine == machines[4]));
+    assert!(machines[4].contains("Grundgelenk für J1"), "{}", machines[4]);
+}
+
+/// A blank cell is 0 with a warning that names its line; the blank of a variable is none, unless other joints have numbers.
+#[test]
+fn a_blank_cell_is_told() {
+    let place = tempfile::tempdir().unwrap();
+    let said = |name: &str, table: &str| {
+        let file = place.path().join("robot.csv");
+        std::fs::write(&file, table).unwrap();
+        let output = abbe(&[
+            "new",
+            text(&place.path().join(name)),
+            "--from-dh",
+            text(&file),
+            "--convention",
+            "standard",
+            "--quiet",
+        ]);
+        success(&output);
+        String::from_utf8_lossy(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let blank = said("a", "a_mm,alpha_deg,d_mm,theta_deg\n0,90,254,\n508,,,\n");
+    assert!(blank.contains("robot.csv:3: `alpha`, `d` of joint `2` is empty: 0") && !blank.contains(":2:"), "{blank}");
+    let variable = said("b", "a_mm,alpha_deg,d_mm,theta_deg\n0,90,254,30\n508,0,0,\n");
+    assert!(variable.contains("robot.csv:3: `theta` of joint `2` is empty: 0"), "{variable}");
+    let whole = said("c", "a_mm,alpha_deg,d_mm,theta_deg\n0,90,254,q1\n508,0,0,q2\n");
+    assert!(!whole.contains("is empty"), "{whole}");
+}
+
 #[test]
 fn limits_are_kept_or_named() {
     let place = tempfile::tempdir().unwrap();
