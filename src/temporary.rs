@@ -14,6 +14,8 @@ use tempfile::{NamedTempFile, TempDir};
 
 /// First characters of the name of a temporary file or folder.
 const PREFIX: &str = ".abbe-";
+/// Random letters and digits of the name: so many that no name of a user is like it.
+const RANDOM: usize = 16;
 /// Last characters of the name of a temporary file.
 const SUFFIX: &str = ".tmp";
 /// The locked file of a temporary folder.
@@ -47,7 +49,7 @@ impl TemporaryFile {
             file.inspect_err(|error| code.set(error.raw_os_error()))
         };
         let make = || {
-            let made = tempfile::Builder::new().prefix(PREFIX).suffix(SUFFIX).make_in(folder, open);
+            let made = tempfile::Builder::new().prefix(PREFIX).suffix(SUFFIX).rand_bytes(RANDOM).make_in(folder, open);
             made.map_err(|error| code.get().map_or(error, io::Error::from_raw_os_error))
         };
         for _ in 0..ATTEMPTS {
@@ -99,7 +101,7 @@ impl TemporaryFolder {
         for _ in 0..ATTEMPTS {
             // Without the path of the temporary folder, which `tempfile` adds to an error.
             let builder = || {
-                let made = tempfile::Builder::new().prefix(PREFIX).tempdir_in(folder);
+                let made = tempfile::Builder::new().prefix(PREFIX).rand_bytes(RANDOM).tempdir_in(folder);
                 made.map_err(|error| error.kind().into())
             };
             let (made, noted) = noted(builder, TempDir::path)?;
@@ -175,12 +177,18 @@ pub fn remove_stale(folder: &Path) {
         let name = entry.file_name();
         let Some(rest) = name.to_str().and_then(|name| name.strip_prefix(PREFIX)) else { continue };
         match entry.file_type() {
-            Ok(kind) if kind.is_file() && rest.ends_with(SUFFIX) => remove_unlocked(&entry.path(), &entry.path()),
-            // The names of the crate `tempfile` have six letters and digits.
-            Ok(kind) if kind.is_dir() && rest.len() == 6 => remove_folder(&entry.path()),
+            Ok(kind) if kind.is_file() && rest.strip_suffix(SUFFIX).is_some_and(is_random) => {
+                remove_unlocked(&entry.path(), &entry.path());
+            }
+            Ok(kind) if kind.is_dir() && is_random(rest) => remove_folder(&entry.path()),
             _ => {}
         }
     }
+}
+
+/// Whether a part of a name is the random one of a temporary file or folder.
+fn is_random(part: &str) -> bool {
+    part.len() == RANDOM && part.bytes().all(|byte| byte.is_ascii_alphanumeric())
 }
 
 /// Removes a temporary folder if its lock is free. One without its lock is empty: it has just been made, or the process
@@ -226,13 +234,16 @@ mod tests {
     fn what_no_process_holds_is_removed() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
-        std::fs::write(at(".abbe-aaaaaa.tmp"), "stale").unwrap();
-        std::fs::create_dir(at(".abbe-bbbbbb")).unwrap();
-        std::fs::create_dir(at(".abbe-cccccc")).unwrap();
-        std::fs::write(at(".abbe-cccccc/lock"), "").unwrap();
-        std::fs::write(at(".abbe-cccccc/readings.csv"), "stale").unwrap();
+        let [file, empty, full] =
+            ["aBcDeFgHiJkLmNo1", "aBcDeFgHiJkLmNo2", "aBcDeFgHiJkLmNo3"].map(|r| format!(".abbe-{r}"));
+        std::fs::write(at(&format!("{file}.tmp")), "stale").unwrap();
+        std::fs::create_dir(at(&empty)).unwrap();
+        std::fs::create_dir(at(&full)).unwrap();
+        std::fs::write(at(&format!("{full}/lock")), "").unwrap();
+        std::fs::write(at(&format!("{full}/readings.csv")), "stale").unwrap();
         // Files of others.
-        for other in [".abbe-notes.txt", ".tmpAbCdEf", "session.toml"] {
+        let others = [".abbe-notes.txt", ".abbe-1.tmp", ".abbe-report.tmp", ".tmpAbCdEf", "session.toml"];
+        for other in others {
             std::fs::write(at(other), "other").unwrap();
         }
         std::fs::create_dir(at(".abbe-results")).unwrap();
@@ -242,14 +253,14 @@ mod tests {
         let mut left: Vec<PathBuf> =
             std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
         left.sort();
-        let mut kept: Vec<PathBuf> = [".abbe-notes.txt", ".tmpAbCdEf", "session.toml", ".abbe-results"].map(at).into();
+        let mut kept: Vec<PathBuf> = others.into_iter().chain([".abbe-results"]).map(at).collect();
         kept.extend([held.file.path().to_path_buf(), held_folder.path().to_path_buf()]);
         kept.sort();
         assert_eq!(left, kept);
         held.persist(&at("held")).unwrap();
         drop(held_folder);
         remove_stale(folder.path());
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 5);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 7);
     }
 
     #[test]

@@ -41,7 +41,13 @@ pub fn write(
             other => other,
         })?;
     }
-    check_files(&whole)?;
+    check_files(&whole).map_err(|failure| match failure {
+        Failure::Write { path, source } => match Path::new(&path).strip_prefix(&whole) {
+            Ok(name) => self::fault(&folder.join(name), source),
+            Err(_) => Failure::Write { path, source },
+        },
+        other => other,
+    })?;
     if present {
         let move_file = |name: &Path| {
             make_folder_of(&folder.join(name))?;

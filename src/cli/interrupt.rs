@@ -1,5 +1,6 @@
-//! Ctrl-C and SIGTERM, which a scheduler sends: the first one ends a search and keeps its results. A second one, or one
-//! without results, ends the program. No temporary file remains.
+//! Ctrl-C, SIGTERM, which a scheduler sends, and SIGHUP of a terminal that is closed: Ctrl-C and SIGTERM end a search and
+//! keep its results. A second one, or one without results, ends the program. No temporary file remains. A file beyond the
+//! limit of its size (`ulimit -f`) is an error of the write, and no signal.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -18,35 +19,61 @@ type Handler = Arc<dyn Fn() + Send + Sync>;
 
 /// Whether SIGTERM came. A signal belongs to the whole process, and so do these two.
 static IS_TERMINATED: AtomicBool = AtomicBool::new(false);
+/// Whether a signal ends the program.
+static IS_ENDED: AtomicBool = AtomicBool::new(false);
 /// What SIGTERM does; without it, it ends the program.
 static HANDLER: Mutex<Option<Handler>> = Mutex::new(None);
 
-/// Handles SIGTERM from now on.
+/// Handles signals from now on.
 #[cfg(unix)]
-pub fn watch_termination() {
-    let Ok(mut signals) = signal_hook::iterator::Signals::new([signal_hook::consts::SIGTERM]) else { return };
+pub fn watch() {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
+    // With a handler, the write that exceeds the limit fails, and says so.
+    let _ = signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
+    // What `nohup` and a script that starts a background job ignore stays ignored.
+    let watched = [SIGTERM, SIGINT, SIGHUP].into_iter().filter(|signal| !is_ignored(*signal));
+    let Ok(mut signals) = signal_hook::iterator::Signals::new(watched) else { return };
     let watch = move || {
-        for _ in signals.forever() {
-            IS_TERMINATED.store(true, Ordering::Relaxed);
-            let handler = HANDLER.lock().unwrap_or_else(PoisonError::into_inner).clone();
-            match handler {
-                Some(handler) => handler(),
-                None => end(),
+        for signal in signals.forever() {
+            if signal == SIGTERM {
+                IS_TERMINATED.store(true, Ordering::Relaxed);
+                if let Some(handler) = HANDLER.lock().unwrap_or_else(PoisonError::into_inner).clone() {
+                    handler();
+                    continue;
+                }
+                end();
             }
+            IS_ENDED.store(true, Ordering::Relaxed);
+            temporary::remove_own();
+            // The shell sees that a signal ended the program.
+            let _ = signal_hook::low_level::emulate_default_handler(signal);
         }
     };
     // Without another thread the signal ends the program as it always does.
     if std::thread::Builder::new().name("signals".into()).spawn(watch).is_err() {
-        tell(Kind::Warning, "SIGTERM cannot be handled; it may leave a temporary file");
+        tell(Kind::Warning, "signals cannot be handled; they may leave a temporary file");
     }
 }
 
-/// Handles SIGTERM from now on: other systems have none.
+/// Handles signals from now on: other systems have only Ctrl-C, which ends the program.
 #[cfg(not(unix))]
-pub fn watch_termination() {}
+pub fn watch() {}
 
-/// Whether SIGTERM came. What fails from then on fails because the temporary files are being removed.
-pub fn is_terminated() -> bool {
+/// Whether the program was started with a signal ignored, where the system tells it (Linux).
+#[cfg(unix)]
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    mask & (1 << (signal - 1)) != 0
+}
+
+/// Whether a signal ends the program. What fails from then on fails because the temporary files are being removed.
+pub fn is_ended() -> bool {
+    IS_ENDED.load(Ordering::Relaxed) || is_terminated()
+}
+
+fn is_terminated() -> bool {
     IS_TERMINATED.load(Ordering::Relaxed)
 }
 

@@ -231,11 +231,14 @@ pub struct CommonArguments {
 
 /// Runs the command line and returns the exit status.
 pub fn run() -> ExitCode {
-    interrupt::watch_termination();
+    interrupt::watch();
     let Arguments { command, quiet, threads } = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         // Help and version, to standard output.
-        Err(shown) if !shown.use_stderr() => shown.exit(),
+        Err(shown) if !shown.use_stderr() => {
+            output::help(&shown);
+            return ExitCode::SUCCESS;
+        }
         Err(wrong) => {
             message::print_usage(wrong);
             return ExitCode::from(2);
@@ -243,7 +246,7 @@ pub fn run() -> ExitCode {
     };
     match with_threads(threads).and_then(|()| execute(command, quiet, threads)) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(_) if interrupt::is_terminated() => ExitCode::from(interrupt::status()),
+        Err(_) if interrupt::is_ended() => ExitCode::from(interrupt::status()),
         Err(failure) => {
             failure.show();
             ExitCode::from(failure.status())

@@ -197,6 +197,14 @@ pub fn whole(text: &str) {
     write_out(format!("{text}\n").as_bytes());
 }
 
+/// Writes a help text or the version to standard output, in colours on a terminal.
+pub fn help(shown: &clap::Error) {
+    let text = shown.render();
+    let is_plain = anstream::AutoStream::choice(&std::io::stdout()) == anstream::ColorChoice::Never;
+    let text = if is_plain { text.to_string() } else { text.ansi().to_string() };
+    write_out(text.as_bytes());
+}
+
 /// Writes to standard output. If the reader has closed the pipe, the program ends; if the output cannot be written, it
 /// ends with an error.
 fn write_out(contents: &[u8]) {

@@ -178,11 +178,15 @@ fn describe(record: &mut Record, session: &Session) {
     record.instrument = Some(session.instrument.word().to_string());
 }
 
+/// Longest name of a file on most file systems, bytes.
+const LONGEST_NAME: usize = 255;
+
 /// The model of a machine; `None` if there is none. Signs that no file name should have are `_`.
 fn model_of(machine_id: &str, places: &Places) -> Option<Model> {
     let plain = |sign: char| if sign.is_alphanumeric() || "-_. ".contains(sign) { sign } else { '_' };
-    let file = places.models.as_ref()?.join(format!("{}.json", machine_id.chars().map(plain).collect::<String>()));
-    if matches!(file.try_exists(), Ok(false)) {
+    let name = format!("{}.json", machine_id.chars().map(plain).collect::<String>());
+    let file = places.models.as_ref()?.join(&name);
+    if name.len() > LONGEST_NAME || matches!(file.try_exists(), Ok(false)) {
         return None;
     }
     let source = abbe_files::text(&file, "the model file").map_err(|error| error.to_string());

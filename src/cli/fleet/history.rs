@@ -55,6 +55,9 @@ pub struct HistoryArguments {
     output: OutputArguments,
 }
 
+/// Characters of an identifier in the name of a page: a name of 255 bytes is the longest of most file systems.
+const LONGEST_NAME: usize = 60;
+
 /// Runs `abbe fleet history`.
 pub fn run(arguments: &HistoryArguments) -> Result<(), Failure> {
     let outputs = arguments.output.prepared(&[])?;
@@ -88,7 +91,7 @@ pub fn run(arguments: &HistoryArguments) -> Result<(), Failure> {
     let mut files = vec![("index.html".to_string(), html(&report::fleet(&stated))?)];
     for (number, machine) in found.history.machines.iter().enumerate() {
         let plain = |sign: char| if sign.is_alphanumeric() || "-_.".contains(sign) { sign } else { '_' };
-        let name: String = machine.machine_id.chars().map(plain).collect();
+        let name: String = machine.machine_id.chars().map(plain).take(LONGEST_NAME).collect();
         // The number keeps machines apart whose identifiers differ in other signs or in case alone.
         let own = report::machine(machine, &statements(std::slice::from_ref(machine)), &found.conformity);
         files.push((format!("{:04}-{name}.html", number + 1), html(&own)?));

@@ -160,17 +160,61 @@ fn a_full_device_for_a_file() {
     assert!(device.is_char_device(), "/dev/full was replaced");
 }
 
+/// Too little memory for the rows of a file is an error with the line at which it ended.
+#[test]
+#[cfg(target_os = "linux")]
+fn too_little_memory_for_a_table_is_an_error() {
+    let place = TestFolder::new();
+    let rows: String = (0..2_000_000).map(|k| format!("{},{},0,100\n", k / 1000, k % 100)).collect();
+    place.put("circle.csv", &format!("run,x_mm,y_mm,length_mm\n{rows}"));
+    // What the program takes for an empty file leaves room for some of the rows.
+    let output = place.shell("ulimit -v 150000; exec abbe fit session.toml --threads 1");
+    refused(&output, &["circle.csv:", "too little memory for more than", "split the file into several tests"]);
+}
+
+/// Help and version are outputs as all others.
+#[test]
+fn a_full_device_for_help_is_an_error() {
+    let place = TestFolder::new();
+    for line in ["abbe --help", "abbe --version", "abbe fit --help", "abbe fit -h"] {
+        let output = place.shell(&format!("{line} > /dev/full"));
+        refused(&output, &["standard output: cannot be written", "No space left"]);
+        let output = place.shell(&format!("{line} | head -n 1"));
+        assert!(output.status.success() && output.stderr.is_empty() && !output.stdout.is_empty(), "{line}");
+    }
+}
+
+/// What a program of the next measurement cannot be written to is named as it would be called.
+#[test]
+fn a_full_disk_names_the_folder_of_the_next_measurement() {
+    let place = TestFolder::new();
+    let session = crate::suite::ready("hermle-c600u/measured/session.toml");
+    let before = place.names();
+    let line = format!(
+        "ulimit -f 16; exec abbe trace {} --only EZC~C:h --next next --control linuxcnc --quiet",
+        text(&session)
+    );
+    let output = place.shell(&line);
+    refused(&output, &["next/programs", "cannot be written", "File too large"]);
+    assert!(!String::from_utf8_lossy(&output.stderr).contains(".abbe-"), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(place.names(), before);
+}
+
 #[test]
 fn a_full_disk_leaves_existing_files_unchanged() {
-    // The limit on the file size is one block: the same error as on a full disk.
-    for (option, file) in [("--report", "out.html"), ("--json", "out.json"), ("--csv", "out.csv"), ("--plots", "plots")]
-    {
+    // The limit on the file size is one block: the same error as on a full disk, whether the signal is ignored or not.
+    for (option, file, trap) in [
+        ("--report", "out.html", "trap '' XFSZ; "),
+        ("--json", "out.json", ""),
+        ("--csv", "out.csv", ""),
+        ("--plots", "plots", ""),
+    ] {
         let place = TestFolder::new();
         if option != "--plots" {
             place.put(file, "old");
         }
         let before = place.names();
-        let output = place.shell(&format!("trap '' XFSZ; ulimit -f 0; exec abbe fit session.toml {option} {file}"));
+        let output = place.shell(&format!("{trap}ulimit -f 0; exec abbe fit session.toml {option} {file}"));
         refused(&output, &[file, "cannot be written", "File too large"]);
         assert_eq!(place.names(), before, "{option}");
         if option != "--plots" {

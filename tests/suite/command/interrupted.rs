@@ -285,14 +285,17 @@ fn a_terminated_program_leaves_no_temporary_file() {
     );
     assert_eq!(output.status.code(), Some(TERMINATED), "{}", String::from_utf8_lossy(&output.stderr));
     assert_eq!(place.names(), before);
-    // At any time.
-    for number in 0..12 {
-        let delay = 0.005 * f64::from(number);
+    // At any time, by a scheduler, by Ctrl-C or by the end of a terminal. A script ignores Ctrl-C in what it starts in the
+    // background.
+    let signals = [("TERM", TERMINATED), ("INT", INTERRUPTED), ("HUP", 129)];
+    for (number, (signal, code)) in (0..24).zip(signals.into_iter().cycle()) {
+        let delay = 0.003 * f64::from(number);
         let line = format!(
-            "abbe fit session.toml --json new.json --plots plots{number} -q & sleep {delay}; kill -TERM $!; wait $!"
+            "env --default-signal=INT abbe fit session.toml --json new.json --plots plots{number} -q & \
+             sleep {delay}; kill -{signal} $!; wait $!"
         );
         let output = place.shell(&line);
-        assert!(matches!(output.status.code(), Some(0 | TERMINATED)), "{:?}", output.status);
+        assert!(output.status.code().is_some_and(|found| found == 0 || found == code), "{signal}: {:?}", output.status);
         for name in place.names() {
             assert!(!name.starts_with(".abbe-"), "{name} is left");
         }
@@ -318,15 +321,15 @@ fn a_terminated_trace_reports_what_it_has_found() {
 #[test]
 fn a_later_command_removes_stale_temporary_files() {
     let place = crate::suite::command::faults::TestFolder::new();
-    place.put(".abbe-aBcD12.tmp", "half of an output");
-    std::fs::create_dir_all(place.at(".abbe-eFgH34/whole")).unwrap();
-    place.put(".abbe-eFgH34/lock", "");
-    place.put(".abbe-eFgH34/whole/session.toml", "half of a folder");
-    place.put(".abbe-iJkL56.tmp", "written by another process");
-    let held = std::fs::File::open(place.at(".abbe-iJkL56.tmp")).unwrap();
+    place.put(".abbe-aBcD12aBcD12aBcD.tmp", "half of an output");
+    std::fs::create_dir_all(place.at(".abbe-eFgH34eFgH34eFgH/whole")).unwrap();
+    place.put(".abbe-eFgH34eFgH34eFgH/lock", "");
+    place.put(".abbe-eFgH34eFgH34eFgH/whole/session.toml", "half of a folder");
+    place.put(".abbe-iJkL56iJkL56iJkL.tmp", "written by another process");
+    let held = std::fs::File::open(place.at(".abbe-iJkL56iJkL56iJkL.tmp")).unwrap();
     held.lock().unwrap();
     assert!(place.shell("abbe fit session.toml --json out.json --quiet").status.success());
-    assert_eq!(place.names(), [".abbe-iJkL56.tmp", "circle.csv", "out.json", "session.toml"]);
+    assert_eq!(place.names(), [".abbe-iJkL56iJkL56iJkL.tmp", "circle.csv", "out.json", "session.toml"]);
     drop(held);
     assert!(place.shell("abbe simulate session.toml --out new --quiet").status.success());
     assert_eq!(place.names(), ["circle.csv", "new", "out.json", "session.toml"]);

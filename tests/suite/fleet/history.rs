@@ -174,6 +174,19 @@ fn a_step_of_a_short_series_is_found_and_named() {
     assert!(screen.contains("EC0Y"), "{screen}");
 }
 
+/// A serial number that is longer than the name of a file may be has a page, and stops none of another machine.
+#[test]
+fn a_long_serial_number_has_a_page() {
+    let long = ["ü", "M"].map(|letter| letter.repeat(300));
+    let place = fleet(6, |k| {
+        format!("serial_number = \"{}\"\nsession_id = \"{}\"\ndate = 2026-{:02}-05", long[k % 2], k / 2, k / 2 + 1)
+    });
+    fs::create_dir(place.at("models")).unwrap();
+    run(&place, "--no-trace --models models");
+    history(&place, "--pages pages");
+    assert_eq!(fs::read_dir(place.at("pages")).unwrap().count(), 3);
+}
+
 /// One machine with a step that a table explains.
 #[test]
 fn a_history_has_pages_and_names_a_compensation() {

@@ -246,7 +246,7 @@ fn a_claim_ends_with_its_process() {
     // The claim of a process that was killed, and its temporary file.
     fs::remove_file(&record).unwrap();
     fs::write(&claim, "").unwrap();
-    fs::write(record.with_file_name(".abbe-aBcD12.tmp"), "half").unwrap();
+    fs::write(record.with_file_name(".abbe-aBcD12aBcD12aBcD.tmp"), "half").unwrap();
     assert!(start(&place, "three.json").wait().unwrap().success());
     assert_eq!(files(&place.at("results/results")).len(), 1);
     assert_eq!(read(&record), whole);
