@@ -1,5 +1,6 @@
 //! Readings from the rows of a file or of columns in memory, by the roles of their columns.
 
+use std::collections::TryReserveError;
 use std::hash::{DefaultHasher, Hasher};
 use std::path::{Path, PathBuf};
 
@@ -8,6 +9,7 @@ use abbe_model::instrument::column::{OF_ROTATION, Quantity};
 use abbe_model::instrument::{Fault, MAX_CHANNELS};
 use abbe_model::session::readings::{Origin, Readings};
 use abbe_model::session::trajectory;
+use abbe_model::words::listed;
 use nalgebra::{Quaternion, UnitQuaternion};
 
 use super::columns::{self, Column, Role};
@@ -114,6 +116,13 @@ pub(super) fn read(
     let mut filled = Filled::new(request, columns, 0);
     let push = |filled: &mut Filled<'_>, row: &Row| {
         let cells = FileRow { file, row, format: &request.format };
+        if filled.line.len() == filled.line.capacity() && filled.line.len() >= MIN_TESTED {
+            filled.reserve().map_err(|_| ModelError::Input {
+                location: Location::line(file, row.line),
+                message: format!("too little memory for more than {} rows", filled.line.len()),
+                help: Some("free memory, thin out the readings, or split the file into several tests".into()),
+            })?;
+        }
         filled.push(&cells)?;
         filled.line.push(row.line);
         if filled.can_have_copies() {
@@ -147,7 +156,7 @@ pub(super) fn read(
         }
     }
     filled.complete(filled.line.len())?;
-    let warning = filled.remove_duplicates(file);
+    let warnings: Vec<String> = filled.lacking(file).into_iter().chain(filled.remove_duplicates(file)).collect();
     match filled.line[..] {
         [] => Err(empty("a header without readings")),
         [line] => Err(ModelError::Input {
@@ -158,10 +167,13 @@ pub(super) fn read(
         _ => Ok(Filling {
             quantities: columns::quantities(&filled.columns),
             by_socket: filled.by_socket(Some(file)),
-            warnings: warning.into_iter().collect(),
+            warnings,
         }),
     }
 }
+
+/// Rows from which the memory for more is asked for before they are read.
+const MIN_TESTED: usize = 1 << 14;
 
 /// What to do about a test with fewer than two readings.
 pub(super) const NOT_ENOUGH: &str = "a test needs at least two readings, and as many as it has parameters";
@@ -363,6 +375,23 @@ impl<'a> Filled<'a> {
         Ok(())
     }
 
+    /// Makes room for as many rows again.
+    ///
+    /// # Errors
+    /// If there is too little memory for them.
+    fn reserve(&mut self) -> Result<(), TryReserveError> {
+        let rows = self.line.len();
+        let Readings { positions, time_s, run, drivers, observed, .. } = &mut self.readings;
+        observed.try_reserve(observed.len())?;
+        run.try_reserve(run.len())?;
+        for column in positions.iter_mut().chain([time_s, &mut self.polar]).chain(drivers.values_mut()) {
+            column.try_reserve(column.len())?;
+        }
+        self.socket.try_reserve(self.socket.len())?;
+        self.cells.try_reserve(self.cells.len())?;
+        self.line.try_reserve(rows)
+    }
+
     /// The columns.
     pub fn columns(&self) -> &[Column] {
         &self.columns
@@ -402,6 +431,32 @@ impl<'a> Filled<'a> {
             self.readings.observed = observed;
         }
         Ok(())
+    }
+
+    /// A message of the rows that lack a channel, the first by its line.
+    fn lacking(&self, file: &Path) -> Option<String> {
+        let lacks = |values: &[f64]| values.iter().any(|value| value.is_nan());
+        let rows = || self.readings.observed.chunks_exact(self.readings.channels.max(1));
+        let first = rows().position(lacks)?;
+        let of_column = |column: &Column, channel: usize| match column.role {
+            Role::Reading(Quantity::Quaternion(_), _) => OF_ROTATION,
+            _ => channel..channel + 1,
+        };
+        let is_lacking = |(column, channel): &(&Column, &usize)| {
+            matches!(column.role, Role::Reading(..))
+                && rows().any(|values| lacks(&values[of_column(column, **channel)]))
+        };
+        let columns = self.columns.iter().zip(&self.channel).filter(is_lacking);
+        let names: Vec<String> = columns.map(|(column, _)| format!("`{}`", column.name)).collect();
+        let count = rows().filter(|values| lacks(values)).count();
+        let lack = if count == 1 { "lacks" } else { "lack" };
+        let line = self.line.get(first).copied().unwrap_or_default();
+        let rows = abbe_model::words::counted(count, "row");
+        Some(format!(
+            "{}:{line}: {rows} {lack} {}, this one first; the other channels are used",
+            file.display(),
+            listed(&names, "or")
+        ))
     }
 
     /// Whether a column tells copies of rows from repeats.

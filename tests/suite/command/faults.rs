@@ -168,7 +168,7 @@ fn too_little_memory_for_a_table_is_an_error() {
     let rows: String = (0..2_000_000).map(|k| format!("{},{},0,100\n", k / 1000, k % 100)).collect();
     place.put("circle.csv", &format!("run,x_mm,y_mm,length_mm\n{rows}"));
     // What the program takes for an empty file leaves room for some of the rows.
-    let output = place.shell("ulimit -v 150000; exec abbe fit session.toml --threads 1");
+    let output = place.shell("ulimit -v 100000; exec abbe fit session.toml --threads 1");
     refused(&output, &["circle.csv:", "too little memory for more than", "split the file into several tests"]);
 }
 

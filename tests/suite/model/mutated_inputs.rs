@@ -23,7 +23,7 @@ const SECONDS: u64 = 100;
 const MAX_MESSAGE: usize = 20_000;
 
 /// The files that are mutated, each with the commands that read it.
-const INPUTS: [(&str, &[&str]); 17] = [
+const INPUTS: [(&str, &[&str]); 22] = [
     (
         "session.toml",
         &[
@@ -69,6 +69,23 @@ const INPUTS: [(&str, &[&str]); 17] = [
         &["fleet history results --json out.json", "fleet run session.toml --out results --no-trace --json out.json"],
     ),
     ("errors.toml", &["simulate session.toml --out out --values errors.toml"]),
+    (
+        "robot.urdf",
+        &["new out --from-urdf robot.urdf", "new out --from-urdf robot.urdf --tip l3 --measured-by sockets"],
+    ),
+    (
+        "robot.csv",
+        &["new out --from-dh robot.csv --convention standard", "new out --from-dh robot.csv --convention modified"],
+    ),
+    (
+        "foreign.csv",
+        &[
+            "import foreign.csv --machine axes.toml --out out --kind ballbar --set bar_mm=100 --set workpiece_ball_mm=[0,0,0] --set \
+             spindle_ball_mm=[0,0,0] --json out.json",
+        ],
+    ),
+    ("certificate.toml", &["fit session.toml --dcc out.html --json out.json"]),
+    ("stars.dat", &["fit stars.toml --json out.json"]),
     ("functions.toml", &["volumetric axes.toml --functions functions.toml --map out.csv --places 3 --json out.json"]),
 ];
 
@@ -151,6 +168,37 @@ fn folder() -> TestFolder {
         "[study]\nanalysis = \"fit\"\ndraws = 2\nlocation_um = 20\nlocation_arcsec = 8\n[[plan]]\nname = \"a\"\n\
          session = \"session.toml\"\n[[noise]]\nname = \"white\"\num = 0.3\n[[effect]]\nname = \"none\"\n",
     );
+    let joint = |k: usize, z: f64| {
+        format!(
+            "  <joint name=\"j{k}\" type=\"revolute\">\n    <parent link=\"l{k}\"/><child link=\"l{}\"/>\n    <origin xyz=\"0.3 0 {z}\" rpy=\"{} 0 0\"/>\n\
+             <axis xyz=\"0 0 1\"/><limit lower=\"-2.5\" upper=\"2.5\" effort=\"1\" velocity=\"1\"/>\n  </joint>\n",
+            k + 1,
+            1.5707963 * f64::from(k as u32 % 2)
+        )
+    };
+    let links: String = (0..5).map(|k| format!("  <link name=\"l{k}\"/>\n")).collect();
+    let joints: String = (0..4).map(|k| joint(k, 0.1 * k as f64)).collect();
+    place.put("robot.urdf", &format!("<?xml version=\"1.0\"?>\n<robot name=\"arm\">\n{links}{joints}</robot>\n"));
+    place.put(
+        "robot.csv",
+        "joint,type,a_mm,alpha_deg,d_mm,theta_deg,lower_deg,upper_deg\none,R,0,90,254,q1,-170,170\ntwo,R,508,0,0,q2 + 30,-120,120\n\
+         three,R,0,-pi/2,0,q3,-150,150\nfour,R,20,90,400,q4 - 90°,-170,170\n",
+    );
+    let foreign = rows[1..].iter().map(|row| format!("{};{};{}\n", row[1], row[2], row[3]).replace('.', ","));
+    place.put("foreign.csv", &format!("Messung 1\nX [mm];Y [mm];Länge [mm]\n{}", foreign.collect::<String>()));
+    place.put("certificate.toml", abbe::certificate::EXAMPLE);
+    let star = |k: u32| {
+        let (azimuth, elevation) = (f64::from(k * 37 % 360), 20.0 + f64::from(k * 13 % 60));
+        format!("{azimuth:.4} {elevation:.4} {:.4} {:.4}\n", azimuth + 0.001 * f64::from(k % 3), elevation + 0.002)
+    };
+    let stars: String = (0..40).map(star).collect();
+    place.put("stars.dat", &format!("A night\n: ALTAZ\n31 57 30\n{stars}END\n"));
+    place.put(
+        "stars.toml",
+        "[machine]\nchain = \"w b AZ EL t\"\naxis.AZ = { kind = \"rotary\", direction = [0, 0, -1] }\n\
+         axis.EL = { kind = \"rotary\", direction = [0, -1, 0] }\n[instrument]\nkind = \"pointing\"\nnoise_arcsec = 2\n\
+         [[test]]\nname = \"night\"\nline_of_sight = [1, 0, 0]\ndata = \"stars.dat\"\n",
+    );
     place.put("list.txt", "# sessions\nsession.toml\nlines.toml\n");
     place.put("known.csv", "machine_id,date,parameter,change,unit\nM,2026-11-01,EC0Y,1.5,arcsec\n");
     place.put("errors.toml", "EC0Y = \"2 arcsec\"\n");
@@ -164,6 +212,10 @@ fn folder() -> TestFolder {
          [[function]]\nerror = \"EYX\"\npolynomial = { scale_mm = 100, um = [0, -2.4, 1.6] }\n",
     );
     for line in [
+        "abbe new arm --from-urdf robot.urdf && abbe new arm2 --from-dh robot.csv --convention standard",
+        "abbe fit stars.toml --quiet && abbe fit session.toml --dcc out.html --quiet && rm out.html",
+        "abbe import foreign.csv --machine axes.toml --out im --kind ballbar --set bar_mm=100 --set workpiece_ball_mm=[0,0,0] \
+         --set spindle_ball_mm=[0,0,0]",
         "abbe fit session.toml --save model.json --quiet",
         "abbe fleet run session.toml --out results --no-trace --quiet",
     ] {
