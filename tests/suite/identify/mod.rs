@@ -12,6 +12,7 @@ pub mod free_set_ups;
 pub mod geometric;
 pub mod left_out_test;
 pub mod measured;
+pub mod metamorphic;
 pub mod nist;
 pub mod one_answer;
 pub mod patterns;
