@@ -8,8 +8,8 @@ use abbe_model::session::readings::Readings;
 use abbe_model::session::{Prior, Test};
 
 /// Checks that the instrument nominally fits: the distance between the balls is the length of the bar, the stylus is in
-/// front of its artefact, the ball is in its nest. If a single mistake in the positions of an axis (its sign, its unit)
-/// explains the deviation, the help names it.
+/// front of its artefact, the ball is in its nest. If a single mistake in the positions of an axis (its sign, its unit, its
+/// column) explains the deviation, the help names it.
 pub(super) fn check(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), Fault> {
     let Err((message, help)) = check_nominal(machine, test, readings) else {
         return Ok(());
@@ -45,7 +45,7 @@ const ROTARY: [Mistake; 3] = [
 /// Largest number of readings on which mistakes are tried.
 const MAX_TRIED: usize = 500;
 
-/// The mistakes, of one axis or of all axes of a kind, whose correction makes the instrument fit.
+/// The mistakes, of one axis, of all axes of a kind, or of two exchanged columns, whose correction makes the instrument fit.
 fn mistakes(machine: &Machine, test: &Test, readings: &Readings) -> Vec<String> {
     let rows: Vec<usize> = (0..readings.rows()).step_by(readings.rows().div_ceil(MAX_TRIED).max(1)).collect();
     let readings = readings.of_rows(&rows);
@@ -69,6 +69,20 @@ fn mistakes(machine: &Machine, test: &Test, readings: &Readings) -> Vec<String> 
                     let description = format!("the positions of {} were read {words}", names.join(" and "));
                     found.push((misfit(machine, test, &corrected), description));
                 }
+            }
+        }
+    }
+    for first in 0..machine.axes.len() {
+        for second in first + 1..machine.axes.len() {
+            let [one, other] = [first, second].map(|axis| &machine.axes[axis]);
+            if one.kind != other.kind || !(matters(first) || matters(second)) {
+                continue;
+            }
+            let mut corrected = readings.clone();
+            corrected.positions.swap(first, second);
+            if check_nominal(machine, test, &corrected).is_ok() {
+                let description = format!("the columns of {} and {} were exchanged", one.name, other.name);
+                found.push((misfit(machine, test, &corrected), description));
             }
         }
     }

@@ -79,6 +79,8 @@ pub enum SuggestionKind {
     BarCalibrationSign,
     /// A ball, a bar or another thing of the set-up is not where, or not as long as, it is stated.
     WrongSetup,
+    /// A ball or a bar was moved or mounted anew before a test, for all later tests of its mount.
+    SetupMoved,
     /// The readings of a test were taken with another set-up or in another session.
     OtherSession,
     /// A column has another unit.

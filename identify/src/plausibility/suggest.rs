@@ -89,18 +89,20 @@ fn is_contradicted(hypothesis: &Hypothesis, problem: &Problem, conflicts: &[Conf
     let group = |id: &str| id.split_once('[').map(|(_, group)| group.trim_end_matches(']').to_string());
     let test = problem.tests.iter().find(|test| test.name == hypothesis.subject);
     conflicts.iter().any(|conflict| match (hypothesis.kind, test) {
-        (SuggestionKind::OtherSession, Some(test)) => group(&conflict.subject)
+        (SuggestionKind::OtherSession | SuggestionKind::SetupMoved, Some(test)) => group(&conflict.subject)
             .is_some_and(|group| [&test.setup, &test.spindle_setup, &test.bar_setup].contains(&&group)),
         _ => {
             let thing = hypothesis.subject.split('[').next().unwrap_or_default();
-            conflict.subject.starts_with(thing) && group(&conflict.subject) == group(&hypothesis.subject)
+            let groups = group(&hypothesis.subject).unwrap_or_default();
+            let of_conflict = group(&conflict.subject).unwrap_or_default();
+            conflict.subject.starts_with(thing) && groups.split('+').any(|group| group == of_conflict)
         }
     })
 }
 
 /// Whether a mistake changes a statement and frees nothing.
 fn needs_no_parameter(kind: SuggestionKind) -> bool {
-    !matches!(kind, SuggestionKind::WrongSetup | SuggestionKind::OtherSession)
+    !matches!(kind, SuggestionKind::WrongSetup | SuggestionKind::SetupMoved | SuggestionKind::OtherSession)
 }
 
 #[cfg(test)]

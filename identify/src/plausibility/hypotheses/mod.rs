@@ -33,6 +33,7 @@ pub(super) fn of_two_sides(session: &Session) -> Vec<Hypothesis> {
     list.extend(set_ups::balls(session));
     list.extend(set_ups::readings(session));
     list.extend(set_ups::things(session));
+    list.extend(set_ups::moves(session));
     list
 }
 
@@ -87,6 +88,19 @@ fn axes(session: &Session) -> Vec<Hypothesis> {
                 SuggestionKind::AxesExchanged,
                 &names.join(", "),
                 format!("axes {} and {} are exchanged in the chain", names[0], names[1]),
+                changed,
+            ));
+        }
+    }
+    let linear: Vec<usize> = used.iter().copied().filter(|k| machine.axes[*k].kind == AxisKind::Linear).collect();
+    for (place, &first) in linear.iter().enumerate() {
+        for &second in &linear[place + 1..] {
+            let changed = with_readings(session, |_, positions, _| positions.swap(first, second));
+            let names = [first, second].map(|k| machine.axes[k].name.as_str());
+            list.push(Hypothesis::new(
+                SuggestionKind::ColumnsExchanged,
+                &names.join(", "),
+                format!("the columns of {} and {} are exchanged", names[0], names[1]),
                 changed,
             ));
         }

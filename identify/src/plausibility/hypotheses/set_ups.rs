@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
+use abbe_model::instrument::SharedBy;
 use abbe_model::session::{Prior, Session, Test};
+use abbe_model::words::listed;
 
 use super::super::results::SuggestionKind;
 use super::{Hypothesis, ZERO_MM, measured, with_readings};
@@ -68,8 +70,21 @@ pub(super) fn readings(session: &Session) -> Vec<Hypothesis> {
         SuggestionKind::DeviationSign,
         "session",
         "the deviations have the opposite sign".to_string(),
-        reversed,
+        reversed.clone(),
     ));
+    for (number, test) in session.tests.iter().enumerate() {
+        if test.readings.is_none() || measured(session).count() < 2 {
+            continue;
+        }
+        let mut changed = session.clone();
+        changed.tests[number].readings.clone_from(&reversed.tests[number].readings);
+        list.push(Hypothesis::new(
+            SuggestionKind::DeviationSign,
+            &test.name,
+            format!("the deviations of test {} have the opposite sign", test.name),
+            changed,
+        ));
+    }
     let mut bars_mm: Vec<f64> = Vec::new();
     for test in measured(session) {
         if let Some(bar) = test.station.bar()
@@ -117,35 +132,68 @@ pub(super) fn readings(session: &Session) -> Vec<Hypothesis> {
     list
 }
 
+/// A mounted thing: its name, and what tests share its mount.
+type Thing = (&'static str, SharedBy);
+
+/// The mounted things whose place or length a session states with an uncertainty, with their mounts in the order of the tests.
+fn mounted(session: &Session) -> Vec<(Thing, Vec<String>)> {
+    let mut found: Vec<(Thing, Vec<String>)> = Vec::new();
+    for test in measured(session) {
+        for (unknown, prior) in test.station.kind().unknowns().iter().zip(&test.priors) {
+            if !matches!(prior, Prior::Gaussian(_)) {
+                continue;
+            }
+            let group = test.group(unknown.shared_by).to_string();
+            match found.iter_mut().find(|((thing, _), _)| *thing == unknown.thing) {
+                Some((_, groups)) if groups.contains(&group) => {}
+                Some((_, groups)) => groups.push(group),
+                None => found.push(((unknown.thing, unknown.shared_by), vec![group])),
+            }
+        }
+    }
+    found
+}
+
+/// Gives a thing in some tests a place or a length that may be any that is physical.
+fn free(tests: &mut [Test], thing: &str, is_meant: impl Fn(&Test, SharedBy) -> bool) {
+    for test in tests {
+        for (place, same) in test.station.kind().unknowns().iter().enumerate() {
+            if same.thing == thing
+                && is_meant(test, same.shared_by)
+                && let Prior::Gaussian(_) = test.priors[place]
+            {
+                test.priors[place] = Prior::Gaussian(physical_size(same.unit));
+            }
+        }
+    }
+}
+
+/// What states a thing in a session file.
+fn statement(thing: &str, several: bool) -> String {
+    let is = if several { "are" } else { "is" };
+    match thing {
+        "bar" => format!("{is} not as long as `bar_mm`, or the lengths in data with `length_mm`, state"),
+        "workpiece_ball" | "spindle_ball" => format!("{is} not where `{thing}_mm` states"),
+        _ => format!("{is} not as stated"),
+    }
+}
+
 /// Balls and bars that differ from their statements, and tests from another session.
 pub(super) fn things(session: &Session) -> Vec<Hypothesis> {
     let mut list: Vec<Hypothesis> = Vec::new();
-    for test in measured(session) {
-        for (place, unknown) in test.station.kind().unknowns().iter().enumerate() {
-            if !matches!(test.priors[place], Prior::Gaussian(_)) {
-                continue;
-            }
-            let group = test.group(unknown.shared_by);
-            let subject =
-                if group.is_empty() { unknown.thing.to_string() } else { format!("{}[{group}]", unknown.thing) };
-            if list.iter().any(|other| other.subject == subject) {
-                continue;
-            }
+    for ((thing, _), groups) in mounted(session) {
+        let name = thing.replace('_', " ");
+        let all = (groups.len() > 1).then(|| groups.clone());
+        for set in groups.into_iter().map(|group| vec![group]).chain(all) {
             let mut changed = session.clone();
-            for other in &mut changed.tests {
-                for (place, same) in other.station.kind().unknowns().iter().enumerate() {
-                    let is_meant = same.thing == unknown.thing && other.group(same.shared_by) == group;
-                    if is_meant && let Prior::Gaussian(_) = other.priors[place] {
-                        other.priors[place] = Prior::Gaussian(physical_size(same.unit));
-                    }
-                }
-            }
-            let thing = unknown.thing.replace('_', " ");
-            let of = if group.is_empty() { String::new() } else { format!(" of {group}") };
+            free(&mut changed.tests, thing, |test, by| set.iter().any(|group| group == test.group(by)));
+            let several = set.len() > 1;
+            let of = if set[0].is_empty() { String::new() } else { format!(" of {}", listed(&set, "and")) };
+            let subject = if set[0].is_empty() { thing.to_string() } else { format!("{thing}[{}]", set.join("+")) };
             list.push(Hypothesis::new(
                 SuggestionKind::WrongSetup,
                 &subject,
-                format!("the {thing}{of} is not as it is stated"),
+                format!("the {name}{}{of} {}", if several { "s" } else { "" }, statement(thing, several)),
                 changed,
             ));
         }
@@ -171,6 +219,50 @@ pub(super) fn things(session: &Session) -> Vec<Hypothesis> {
             format!("the readings of test {} were taken with another set-up or in another session", test.name),
             changed,
         ));
+    }
+    list
+}
+
+/// A thing that was moved or mounted anew between two tests that share its mount, for all tests from then on.
+pub(super) fn moves(session: &Session) -> Vec<Hypothesis> {
+    let mut list: Vec<Hypothesis> = Vec::new();
+    for ((thing, by), groups) in mounted(session) {
+        for group in groups {
+            let of_mount: Vec<usize> = (0..session.tests.len())
+                .filter(|number| session.tests[*number].readings.is_some() && session.tests[*number].group(by) == group)
+                .collect();
+            for (place, first) in of_mount.iter().enumerate().skip(1) {
+                let mut changed = session.clone();
+                let moved = format!("{group} from {}", session.tests[*first].name);
+                for number in &of_mount[place..] {
+                    let test = &mut changed.tests[*number];
+                    match by {
+                        SharedBy::Setup => test.setup.clone_from(&moved),
+                        SharedBy::SpindleSetup => test.spindle_setup.clone_from(&moved),
+                        SharedBy::BarSetup => test.bar_setup.clone_from(&moved),
+                        SharedBy::Sensors | SharedBy::Socket | SharedBy::Session => continue,
+                    }
+                }
+                free(&mut changed.tests, thing, |test, by| test.group(by) == moved);
+                let tests: Vec<&str> =
+                    of_mount[place..].iter().map(|number| session.tests[*number].name.as_str()).collect();
+                list.push(Hypothesis::new(
+                    SuggestionKind::SetupMoved,
+                    &session.tests[*first].name,
+                    format!(
+                        "the {} of {group} was moved before test {}{}",
+                        thing.replace('_', " "),
+                        tests[0],
+                        if tests.len() > 1 {
+                            format!(", for {} too", listed(&tests[1..], "and"))
+                        } else {
+                            String::new()
+                        }
+                    ),
+                    changed,
+                ));
+            }
+        }
     }
     list
 }
