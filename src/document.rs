@@ -9,8 +9,10 @@ use abbe_identify::model_file::{InputFile, Provenance};
 use abbe_identify::problem::Problem;
 use abbe_identify::results::validation::{MovedParameter, ValidationResult};
 use abbe_identify::results::{FitResult, Statements, TraceResult, ValidationStatement};
-use abbe_plan::PlanStatement;
+use abbe_model::effect::Effect;
+use abbe_model::session::Session;
 use abbe_plan::results::{Contribution, PlanAnalysis};
+use abbe_plan::{PlanStatement, attainable};
 use abbe_trace::TraceOutcome;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -116,14 +118,20 @@ pub type StatedHistory<'r> = Stated<'r, crate::fleet::history::FleetHistory, cra
 impl<'r> StatedFit<'r> {
     /// Of a fit.
     pub fn of_fit(problem: &Problem, result: &'r FitResult) -> Self {
-        Stated { statements: Statements::of_fit(problem, result), result }
+        let mut statements = Statements::of_fit(problem, result);
+        statements.measure.step = attainable(&problem.session, statements.measure.step);
+        Stated { statements, result }
     }
 }
 
 impl<'r> StatedTrace<'r> {
     /// Of a trace.
     pub fn of_trace(trace: &'r TraceOutcome) -> Self {
-        Stated { statements: Statements::of_trace(&trace.after, &trace.result), result: &trace.result }
+        let mut statements = Statements::of_trace(&trace.after, &trace.result);
+        let mut session = Session::clone(&trace.after.session);
+        session.effects = trace.after.parameters.effects.iter().map(Effect::alone).collect();
+        statements.measure.step = attainable(&session, statements.measure.step);
+        Stated { statements, result: &trace.result }
     }
 }
 

@@ -54,4 +54,4 @@ pub mod test_variations;
 pub use analysis::{PlanOptions, analyse, prepared};
 pub use error::PlanError;
 pub use separate::{SeparatingTest, SeparationAnalysis, separating_tests, separation};
-pub use statements::PlanStatement;
+pub use statements::{PlanStatement, attainable};

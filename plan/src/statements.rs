@@ -3,10 +3,16 @@
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{NextStep, Statements};
 use abbe_identify::statements::has_candidates;
+use abbe_model::session::Session;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::analysis::{PlanOptions, prepared};
+use crate::design::Goal;
+use crate::improve::{ImproveOptions, improve};
 use crate::results::{Contribution, ErrorAnalysis, PlanAnalysis};
+use crate::test_variations::TestVariations;
+use crate::{PlanError, states};
 
 /// Whether a plan is good.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
@@ -27,6 +33,22 @@ const MIN_LIMITING_SHARE: f64 = 0.1;
 /// Contributions that limit an error, at most.
 const MAX_LIMITING: usize = 2;
 
+/// The step after a session is identified, or [`NextStep::NoneHelps`] if it asks for a test that identifies and no
+/// candidate test does.
+pub fn attainable(session: &Session, step: NextStep) -> NextStep {
+    attainable_of(step, || {
+        let (complete, noise) = prepared(session, &PlanOptions::default())?;
+        states::problem_by_test(&complete, noise)
+    })
+}
+
+fn attainable_of(step: NextStep, problem: impl FnOnce() -> Result<Problem, PlanError>) -> NextStep {
+    let options = ImproveOptions { goal: Goal::WorstUncertainty, tests: 1, by_minute: false };
+    let helps = || Ok::<_, PlanError>(!improve(&problem()?, &TestVariations::default(), &options)?.steps.is_empty());
+    // A search that fails proposes nothing either.
+    if step == NextStep::Identify && !helps().unwrap_or(false) { NextStep::NoneHelps } else { step }
+}
+
 impl PlanAnalysis {
     /// The three statements of the plan of a problem.
     pub fn statements(&self, problem: &Problem) -> Statements<PlanStatement, Contribution> {
@@ -46,7 +68,7 @@ impl PlanAnalysis {
             },
             correct: worst.map_or(Vec::new(), limiting),
             further: Vec::new(),
-            measure: step.into(),
+            measure: attainable_of(step, || Ok(problem.clone())).into(),
         }
     }
 }

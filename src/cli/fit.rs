@@ -80,7 +80,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         propagation::add_monte_carlo(&problem, &found, draws, &mut result)?;
     }
     arguments.forms.add(&problem, &found, &mut result)?;
-    let commands = arguments.session.commands();
+    let commands = arguments.session.commands("fit", &common.repeated(&arguments.assume));
     let stated = StatedFit::of_fit(&problem, &result);
     let report = report::fit::report(&problem, &found, &stated, &commands, common.output.figures())?;
     common.output.put(&outputs, &report, &stated, &read)?;

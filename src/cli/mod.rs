@@ -51,6 +51,7 @@ use std::process::ExitCode;
 use abbe::files::{self, ReadOptions, SourceMap};
 use abbe::identify::plausibility::{self, Plausibility};
 use abbe::model::session::Session;
+use abbe::model::session::motion::Motion;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use crate::report::commands::Commands;
@@ -203,9 +204,19 @@ impl SessionArguments {
         self.data.options()
     }
 
-    /// How command lines name the session.
-    fn commands(&self) -> Commands {
-        Commands::of(&self.session, self.data.data.as_deref(), self.data.allow_outside)
+    /// Reads the planned motions of a session; its data only if a test states its positions there alone, and `needs` them.
+    fn read_planned(&self, needs: impl Fn(&Session) -> bool) -> Result<(Session, SourceMap), Failure> {
+        let source = files::text(&self.session, "the session file")?;
+        let (session, sources) = files::session_of(&source, &ReadOptions { read_data: false, ..self.options() })?;
+        if needs(&session) && session.tests.iter().any(|test| matches!(test.motion, None | Some(Motion::List))) {
+            return Ok(files::session_of(&source, &self.options())?);
+        }
+        Ok((session, sources))
+    }
+
+    /// How command lines name the session after a command with these options, on which its result depends.
+    fn commands(&self, verb: &'static str, options: &[(&str, String)]) -> Commands {
+        Commands::of(&self.session, self.data.data.as_deref(), self.data.allow_outside).made_by(verb, options)
     }
 }
 
@@ -227,6 +238,14 @@ pub struct CommonArguments {
     /// Example: --seed 7
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+}
+
+impl CommonArguments {
+    /// The seed and the accepted explanations, for a command line that repeats the result.
+    fn repeated(&self, assumed: &[String]) -> Vec<(&'static str, String)> {
+        let seed = (self.seed != 1).then(|| ("--seed", self.seed.to_string()));
+        seed.into_iter().chain(assumed.iter().map(|effect| ("--assume", effect.clone()))).collect()
+    }
 }
 
 /// Runs the command line and returns the exit status.

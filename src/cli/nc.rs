@@ -5,7 +5,6 @@ pub mod motion;
 use std::path::PathBuf;
 
 use abbe::codegen::nc::{self, NcFiles};
-use abbe::files::{self, ReadOptions};
 use abbe::plan::collision;
 use clap::Args;
 
@@ -44,16 +43,15 @@ pub struct NcArguments {
 pub fn run(arguments: &NcArguments, quiet: bool) -> Result<(), Failure> {
     let control = arguments.control;
     let options = arguments.motion.options();
-    let reading = ReadOptions { read_data: false, ..arguments.session.options() };
-    let (session, sources) = files::session_with_sources(&arguments.session.session, &reading)?;
-    let NcFiles { files: written, warnings, moves, .. } = nc::files(&session, control, &options)?;
+    let (session, sources) = arguments.session.read_planned(|session| nc::has_letters(&session.machine))?;
+    let NcFiles { files: written, warnings, moves, runs } = nc::files(&session, control, &options)?;
     output::Outputs::in_folder(&arguments.out, written.iter().map(|(name, _)| name))
         .refuse_overwrite_of_sources(&sources)?;
     folder::write(&arguments.out, &written, arguments.folder.force, |_| Ok(()))?;
     print_warnings(&warnings);
     print_warnings(&collision::warnings_of_programs(&session, &moves)?);
     if !quiet {
-        let report = present::report(&session, &written, control);
+        let report = present::report(&session, &written, &runs, control);
         output::whole(&terminal::report(&report, None));
     }
     Ok(())

@@ -21,3 +21,12 @@ pub struct SearchArguments {
     #[arg(long, value_name = "TEXT", allow_hyphen_values = true)]
     pub exclude: Vec<String>,
 }
+
+impl SearchArguments {
+    /// The options, for a command line that repeats the search.
+    pub fn repeated(&self) -> Vec<(&'static str, String)> {
+        let most = self.max_effects.iter().map(|most| ("--max-effects", most.to_string()));
+        let only = self.only.iter().map(|text| ("--only", text.clone()));
+        most.chain(only).chain(self.exclude.iter().map(|text| ("--exclude", text.clone()))).collect()
+    }
+}

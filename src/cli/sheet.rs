@@ -5,8 +5,6 @@ mod order;
 use std::path::PathBuf;
 
 use abbe::codegen::nc::Control;
-use abbe::files::{self, ReadOptions};
-use abbe::model::session::motion::Motion;
 use abbe::model::words::counted;
 use abbe::plan::sheet::{SetUpTimes, sheets};
 use clap::Args;
@@ -69,13 +67,7 @@ pub fn run(arguments: &SheetArguments, quiet: bool) -> Result<(), Failure> {
     arguments.bar_mm.map(|mm| values::BAR_MM.check("--bar-mm", mm)).transpose()?;
     output::check_page(&arguments.out)?;
     let outputs = output::Outputs::new([&arguments.out])?.quieted(quiet);
-    let reading = ReadOptions { read_data: false, ..arguments.session.options() };
-    let source = files::text(&arguments.session.session, "the session file")?;
-    let (mut session, mut sources) = files::session_of(&source, &reading)?;
-    // Poses stand in the data.
-    if session.tests.iter().any(|test| matches!(test.motion, None | Some(Motion::List))) {
-        (session, sources) = files::session_of(&source, &arguments.session.options())?;
-    }
+    let (session, sources) = arguments.session.read_planned(|_| true)?;
     outputs.refuse_overwrite_of_sources(&sources)?;
     let times = SetUpTimes { setup_min: arguments.setup_min, test_min: arguments.test_min, bar_min: arguments.bar_min };
     let bars = session.tests.iter().filter_map(|test| Some(test.station.bar()?.bar));

@@ -91,7 +91,9 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     let ends = (arguments.time_limit, common.output.quiet);
     let trace = progress::trace(&session, &options, arguments.plausibility, ends)?;
     let stated = StatedTrace::of_trace(&trace);
-    let report = present::report(&trace, &stated, &arguments.session.commands(), common.output.figures())?;
+    let repeated = [common.repeated(&arguments.assume), arguments.search.repeated()].concat();
+    let commands = arguments.session.commands("trace", &repeated);
+    let report = present::report(&trace, &stated, &commands, common.output.figures())?;
     common.output.put(&outputs, &report, &stated, &Read::session(&session, &sources, common.seed))?;
     if let Some(path) = &arguments.write {
         next_session::write(path, &sources, &arguments.session, |text| {

@@ -44,6 +44,6 @@ pub fn run(arguments: &ValidateArguments) -> Result<(), Failure> {
     let mut read = Read::session(&session, &sources, common.seed);
     read.files.extend(&source.stamp);
     let stated = StatedValidation::of_validation(&validation.result);
-    let report = report::validate::report(&session, &validation, &stated, &arguments.session.commands());
+    let report = report::validate::report(&session, &validation, &stated, &arguments.session.commands("validate", &[]));
     common.output.put(&outputs, &report, &stated, &read)
 }

@@ -1,46 +1,88 @@
 //! The command lines that a report proposes.
+//!
+//! What they write stands beside the session, so that its machine and its data are found. One name has one meaning: the
+//! session with a further test, the session with the found effects, the folder of the next measurement.
 
 use std::path::Path;
 
 use super::provenance::quoted;
 
-/// The session file that proposed commands write.
-const NEXT: &str = "next.toml";
+/// The session with a proposed test, which a proposed command writes.
+pub const NEXT: &str = "next.toml";
+/// The session with the found effects.
+pub const TRACED: &str = "traced.toml";
+/// The folder of what a trace proposes to measure.
+pub const MEASURE: &str = "measure-next";
+/// The folder of the NC programs of [`NEXT`].
+pub const PROGRAMS: &str = "programs";
+/// The folder of simulated readings.
+pub const SIMULATED: &str = "run1";
 
 /// How command lines name the session of a report: `abbe plan session.toml --improve`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Commands {
-    /// The session file and the options that reading it needs, quoted for a shell.
+    /// The session file; empty if it has no name.
     session: String,
-    /// The session file that a proposed command writes.
-    next: &'static str,
-}
-
-impl Default for Commands {
-    fn default() -> Commands {
-        Commands { session: "SESSION".to_string(), next: NEXT }
-    }
+    /// The options that reading it needs, quoted for a shell, each after a space.
+    reading: String,
+    /// The command that made the report, and its options on which the result depends.
+    made_by: (&'static str, String),
+    /// Whether a trace has found effects, which a plan needs.
+    has_effects: bool,
 }
 
 impl Commands {
     /// Of a session file, the folder of its data if it is stated, and whether it may read files outside its folder.
     pub fn of(session: &Path, data: Option<&Path>, allow_outside: bool) -> Commands {
-        let quoted = |path: &Path| quoted(path.display().to_string());
-        let data = data.map_or(String::new(), |data| format!(" --data {}", quoted(data)));
+        let data = data.map_or(String::new(), |data| format!(" --data {}", quoted(data.display().to_string())));
         let outside = if allow_outside { " --allow-outside" } else { "" };
-        let is_next = session.file_name().is_some_and(|name| name == NEXT);
-        let next = if is_next { "after-next.toml" } else { NEXT };
-        Commands { session: format!("{}{data}{outside}", quoted(session)), next }
+        let reading = format!("{data}{outside}");
+        Commands { session: session.display().to_string(), reading, ..Commands::default() }
     }
 
-    /// The session file that a proposed command writes: another one for a session of this name.
-    pub fn next_session(&self) -> &'static str {
-        self.next
+    /// The same for the report of a command with these options, on which its result depends: its name in a proposed
+    /// command has them too.
+    pub fn made_by(self, verb: &'static str, options: &[(&str, String)]) -> Commands {
+        let options = options.iter().map(|(option, value)| match value.as_str() {
+            "" => format!(" {option}"),
+            value => format!(" {option} {}", quoted(value.to_string())),
+        });
+        Commands { made_by: (verb, options.collect()), ..self }
+    }
+
+    /// The same after a trace that has found effects.
+    pub fn with_effects(self, has_effects: bool) -> Commands {
+        Commands { has_effects, ..self }
+    }
+
+    /// A plan of what is known of the session: with the effects that a trace has found, of [`TRACED`].
+    pub fn plan(&self, options: &str) -> String {
+        if self.has_effects { self.on(TRACED, "plan", options) } else { self.command("plan", options) }
+    }
+
+    /// The command that writes [`TRACED`], if a trace has found effects.
+    pub fn declare_effects(&self) -> Option<String> {
+        self.has_effects.then(|| self.command("trace", &format!("--write {}", self.beside(TRACED))))
     }
 
     /// A command on the session.
     pub fn command(&self, verb: &str, options: &str) -> String {
-        format!("abbe {verb} {} {options}", self.session).trim_end().to_string()
+        let session = if self.session.is_empty() { "SESSION".to_string() } else { quoted(self.session.clone()) };
+        let own = if self.made_by.0 == verb { self.made_by.1.as_str() } else { "" };
+        format!("abbe {verb} {session}{}{own} {options}", self.reading).trim_end().to_string()
+    }
+
+    /// A file or folder beside the session: another one for a session of this name.
+    pub fn beside(&self, name: &str) -> String {
+        let session = Path::new(&self.session);
+        let is_session = session.file_name().is_some_and(|own| own == name);
+        let name = if is_session { format!("after-{name}") } else { name.to_string() };
+        quoted(session.with_file_name(name).display().to_string())
+    }
+
+    /// A command on a session that a proposed command writes.
+    pub fn on(&self, written: &str, verb: &str, options: &str) -> String {
+        format!("abbe {verb} {}{} {options}", self.beside(written), self.reading).trim_end().to_string()
     }
 }
 
@@ -49,11 +91,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn proposed_commands_are_quoted_and_write_another_session() {
+    fn proposed_commands_are_quoted_and_write_beside_the_session() {
         let commands = Commands::of(Path::new("my session/a$b.toml"), Some(Path::new("d")), true);
         assert_eq!(commands.command("plan", ""), "abbe plan 'my session/a$b.toml' --data d --allow-outside");
-        assert_eq!(commands.next_session(), "next.toml");
-        let next = Commands::of(Path::new("my session/next.toml"), None, false);
-        assert_eq!(next.next_session(), "after-next.toml");
+        assert_eq!(commands.beside(NEXT), "'my session/next.toml'");
+        assert_eq!(commands.on(NEXT, "fit", "--all"), "abbe fit 'my session/next.toml' --data d --allow-outside --all");
+        let next = Commands::of(Path::new("mill/next.toml"), None, false);
+        assert_eq!([NEXT, TRACED].map(|name| next.beside(name)), ["mill/after-next.toml", "mill/traced.toml"]);
+        let unnamed = Commands::default();
+        assert_eq!(
+            (unnamed.command("trace", ""), unnamed.beside(NEXT)),
+            ("abbe trace SESSION".into(), "next.toml".into())
+        );
+    }
+
+    /// A command proposes itself with the options on which its result depends, and others without them.
+    #[test]
+    fn options_of_the_result_stay() {
+        let options = [("--only", "EZC~C:h2.5 x".to_string()), ("--planned", String::new())];
+        let commands = Commands::of(Path::new("s.toml"), None, false).made_by("trace", &options);
+        assert_eq!(commands.command("trace", "--all"), "abbe trace s.toml --only 'EZC~C:h2.5 x' --planned --all");
+        assert_eq!(commands.command("plan", "--improve"), "abbe plan s.toml --improve");
     }
 }

@@ -80,7 +80,8 @@ pub fn report(
     straightness::section(&mut report, &result.straightness);
     report.section("Next");
     let steps = next(problem, result, statements.measure.step, commands);
-    report.steps(steps, (commands.command("fit", "--report fit.html"), "write residuals, plots and sliders as a page"));
+    let page = commands.command("fit", &format!("--report {}", commands.beside("fit.html")));
+    report.steps(steps, (page, "write residuals, plots and sliders as a page"));
     report.section("Residuals");
     report.detail(Text::List(quality.held_out_sentences(None)));
     if !figures {
@@ -145,7 +146,7 @@ fn next(problem: &Problem, result: &FitResult, step: NextStep, commands: &Comman
     if matches!(step, NextStep::Trace | NextStep::StateNoise) {
         add(commands.command("trace", ""), "find the unmodelled effect behind the residual");
     }
-    if !result.unobservable.is_empty() && !has_candidates(problem) {
+    if !result.unobservable.is_empty() && (step == NextStep::NoneHelps || !has_candidates(problem)) {
         add("measure a further test".into(), "move axes that these tests leave at rest");
     }
     steps

@@ -2,7 +2,7 @@
 
 use abbe::apply::compare::ComparisonStatement;
 use abbe::apply::compare::results::Difference;
-use abbe::codegen::nc::has_letters;
+use abbe::codegen::nc::{self, has_letters};
 #[cfg(feature = "fleet")]
 use abbe::fleet::history::HistoryStatements;
 use abbe::identify::results::validation::MovedParameter;
@@ -14,12 +14,12 @@ use abbe::identify::results::{
 use abbe::identify::tolerance::rule::Decision;
 use abbe::model::chain::Machine;
 use abbe::model::session::Session;
-use abbe::model::words::{counted, first_of};
+use abbe::model::words::{counted, first_of, listed};
 use abbe::plan::PlanStatement;
 use abbe::plan::results::{Contribution, ErrorAnalysis, PlanAnalysis};
 
 use super::block::Sentence;
-use super::commands::Commands;
+use super::commands::{Commands, MEASURE, NEXT, PROGRAMS};
 use super::number::{fixed, places, quantity, three_digits, value_and_u};
 use super::parameters::PRIOR;
 use super::quality::agreement;
@@ -115,21 +115,21 @@ fn in_short(change: &AxisCorrection) -> String {
 
 /// What to measure next, and the commands for it: its program, if the axes of the machine have letters.
 fn measure(statement: &MeasureStatement, machine: Option<&Machine>, commands: &Commands) -> Vec<Sentence> {
-    let (next, command) = (commands.next_session(), |verb: &str, options: &str| commands.command(verb, options));
-    let with_program = |what: String, verb: &str, options: &str| {
-        let program = format!("abbe nc {next} --control CONTROL --out programs");
-        let written = |words: &str| Sentence::Command(command(verb, options), words.into());
-        match machine.is_some_and(has_letters) {
-            true => vec![what.into(), written("writes the test,"), Sentence::Command(program, "its program".into())],
-            false => vec![what.into(), written("writes the test")],
-        }
-    };
+    let command = |verb: &str, options: &str| commands.command(verb, options);
     let plan = |purpose: &str| {
-        with_program(
-            format!("What to measure next: the test that {purpose}"),
-            "plan",
-            &format!("--improve --write {next}"),
-        )
+        let what = format!("What to measure next: the test that {purpose}");
+        let declared = commands.declare_effects();
+        let mut sentences = vec![what.into()];
+        sentences.extend(declared.map(|command| Sentence::Command(command, "declares the effects,".into())));
+        let written = commands.plan(&format!("--improve --write {}", commands.beside(NEXT)));
+        let has_program = machine.is_some_and(has_letters);
+        let words = if has_program { "writes the test," } else { "writes the test" };
+        sentences.push(Sentence::Command(written, words.into()));
+        if has_program {
+            let options = format!("--control CONTROL --out {}", commands.beside(PROGRAMS));
+            sentences.push(Sentence::Command(commands.on(NEXT, "nc", &options), its_program()));
+        }
+        sentences
     };
     let one = |what: &str| vec![format!("What to measure next: {what}").into()];
     match statement.step {
@@ -138,8 +138,8 @@ fn measure(statement: &MeasureStatement, machine: Option<&Machine>, commands: &C
         NextStep::StateNoise => one("a run once more, or state the noise: only then can the model be judged"),
         NextStep::SeparatingTest => {
             let test = statement.description.as_deref().unwrap_or_default();
-            let written = command("trace", "--next next --control CONTROL");
-            let what = "writes the test, its program and its sheet".into();
+            let written = command("trace", &format!("--next {} --control CONTROL", commands.beside(MEASURE)));
+            let what = format!("writes the test, {} and its sheet", its_program());
             vec![format!("What to measure next: {test}").into(), Sentence::Command(written, what)]
         }
         NextStep::Identify => plan(IDENTIFIES),
@@ -149,11 +149,17 @@ fn measure(statement: &MeasureStatement, machine: Option<&Machine>, commands: &C
             one(&format!("nothing new; all that this instrument can determine is determined ({rank})"))
         }
         NextStep::Nothing => one("no candidate test is known for this instrument"),
+        NextStep::NoneHelps => one("no candidate test makes the confounded parameters identifiable"),
         NextStep::Refit => one(&format!("nothing before {}, which identifies the machine anew", command("trace", ""))),
         NextStep::WidenRange => one("a session that covers the range of these readings"),
         NextStep::Repeat => one("the session once more"),
         NextStep::NextCheck => one("the next check"),
     }
+}
+
+/// The program that a proposed command writes, and the controls among which the user chooses.
+fn its_program() -> String {
+    format!("its program (CONTROL: {})", listed(&nc::CONTROLS.map(nc::Control::word), "or"))
 }
 
 /// `12.1 ± 1.9 µm`.

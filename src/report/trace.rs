@@ -2,14 +2,15 @@
 
 use abbe::document::StatedTrace;
 use abbe::identify::IdentifyError;
-use abbe::identify::results::{EffectResult, GoodnessVerdict, ModelResult, PriorResult, TraceResult, TraceVerdict};
+use abbe::identify::results::{
+    EffectResult, GoodnessVerdict, ModelResult, NextStep, PriorResult, TraceResult, TraceVerdict,
+};
 use abbe::identify::series::{spectrum, views};
-use abbe::identify::statements::has_candidates;
 use abbe::model::words::counted;
 use abbe::trace::TraceOutcome;
 
 use super::block::{KeyFigure, Level, Report, Sentence, Text};
-use super::commands::Commands;
+use super::commands::{Commands, TRACED};
 use super::effect::name;
 use super::fit::{Figures, rank};
 use super::number::{capitalised, integer, of_readings, p_value, quantity, unit, value_and_u};
@@ -35,6 +36,7 @@ pub fn report(
     figures: bool,
 ) -> Result<Report, IdentifyError> {
     let (result, statements) = (stated.result, &stated.statements);
+    let commands = &commands.clone().with_effects(!result.effects.is_empty());
     let problem = &trace.after;
     let mut report = Report::new(format!("Trace of {}", problem.session.machine.name));
     report.warnings.clone_from(&result.warnings);
@@ -83,7 +85,10 @@ pub fn report(
     report.section("Next");
     report.headed(Level::Key, "Tests that separate an effect from its aliases:", Text::List(measure_next(result)));
     let page = "write residuals, plots and alternatives as a page";
-    report.steps(next(trace, commands), (commands.command("trace", "--report trace.html"), page));
+    report.steps(
+        next(result, statements.measure.step, commands),
+        (commands.command("trace", &format!("--report {}", commands.beside("trace.html"))), page),
+    );
     if !figures {
         return Ok(report);
     }
@@ -215,8 +220,7 @@ fn measure_next(result: &TraceResult) -> Vec<String> {
 }
 
 /// What to do next.
-fn next(trace: &TraceOutcome, commands: &Commands) -> Vec<(String, String)> {
-    let result = &trace.result;
+fn next(result: &TraceResult, measure: NextStep, commands: &Commands) -> Vec<(String, String)> {
     let mut steps: Vec<(String, String)> = Vec::new();
     let mut step = |step: String, purpose: &str| steps.push((step, purpose.to_string()));
     if !result.plausibility.conflicts.is_empty() {
@@ -224,13 +228,12 @@ fn next(trace: &TraceOutcome, commands: &Commands) -> Vec<(String, String)> {
     }
     if result.interrupted {
         step(commands.command("trace", ""), "search to the end");
-    } else if !result.effects.is_empty() {
-        let written = commands.next_session();
-        let purpose = format!("declare the effects in a session, which `abbe fit {written}` fits");
-        step(commands.command("trace", &format!("--write {written}")), &purpose);
+    } else if let Some(declared) = commands.declare_effects() {
+        let purpose = format!("declare the effects in a session, which `{}` fits", commands.on(TRACED, "fit", ""));
+        step(declared, &purpose);
     }
-    if !result.unobservable.is_empty() && has_candidates(&trace.after) {
-        step(commands.command("plan", "--improve"), &format!("propose the test that {IDENTIFIES}"));
+    if measure == NextStep::Identify {
+        step(commands.plan("--improve"), &format!("propose the test that {IDENTIFIES}"));
     }
     steps
 }

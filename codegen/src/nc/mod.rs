@@ -25,6 +25,7 @@ use abbe_model::chain::Machine;
 use abbe_model::session::motion::Motion;
 use abbe_model::session::moves::Moves;
 use abbe_model::session::{Session, Test};
+use abbe_model::words::listed;
 
 pub use options::NcOptions;
 pub use program::Program;
@@ -103,6 +104,8 @@ pub struct Run {
     pub mounted_at: Vec<f64>,
     /// Positions of all axes where the motion begins, with overshoot, mm and degrees.
     pub start: Vec<f64>,
+    /// Positions of all axes at which the balls of a bar coincide, mm and degrees; `None` if they cannot.
+    pub centring: Option<Vec<f64>>,
     /// The feed of the measured path and its unit.
     pub feed: (f64, &'static str),
     /// Duration of all traversals with overshoot and pauses, min.
@@ -127,23 +130,41 @@ pub fn has_letters(machine: &Machine) -> bool {
     program::letters(machine).is_ok()
 }
 
-/// Whether programs of a session can be written: every axis has a letter, and every test states a motion.
+/// Whether programs of a session can be written: every axis has a letter, and every test that is not measured states a
+/// motion.
 pub fn has_programs(session: &Session) -> bool {
-    let states_motion = |test: &Test| !matches!(test.motion, None | Some(Motion::List));
-    has_letters(&session.machine) && session.tests.iter().all(states_motion)
+    has_letters(&session.machine)
+        && session.tests.iter().any(states_motion)
+        && session.tests.iter().all(|test| states_motion(test) || test.readings.is_some())
 }
 
-/// The programs of every test of a session, and `main`, which calls them.
+/// Whether a program can follow from what the session states of a test.
+fn states_motion(test: &Test) -> bool {
+    !matches!(test.motion, None | Some(Motion::List))
+}
+
+/// The programs of every test of a session, and `main`, which calls them. A test whose positions stand in its readings alone
+/// has been measured: beside others it has no program.
 ///
 /// # Errors
-/// If a test has no motion, an axis has no letter, an axis would leave its travel, or the control lacks what the
-/// options ask for.
+/// If a test has neither a motion nor readings, no test has a motion, an axis has no letter, an axis would leave its
+/// travel, or the control lacks what the options ask for.
 pub fn files(session: &Session, control: &dyn Control, options: &NcOptions) -> Result<NcFiles, CodegenError> {
     options.check(control, session.tests.len())?;
     let (mut files, mut warnings, mut moves, mut runs) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut calls: Vec<(String, String)> = Vec::new();
     let mut seen: Vec<&str> = Vec::new();
-    for (number, test) in session.tests.iter().enumerate() {
+    let (planned, measured): (Vec<&Test>, Vec<&Test>) =
+        session.tests.iter().partition(|test| states_motion(test) || test.readings.is_none());
+    let measured: Vec<&str> = measured.iter().map(|test| test.name.as_str()).collect();
+    let planned = if planned.is_empty() { session.tests.iter().collect() } else { planned };
+    if planned.len() < session.tests.len() {
+        warnings.push(format!(
+            "no program for {}: measured, and without a motion in the session",
+            listed(&measured, "and")
+        ));
+    }
+    for (number, test) in planned.into_iter().enumerate() {
         // The workpiece ball is centred once for each of its places.
         let centred = seen.contains(&test.setup.as_str());
         seen.push(&test.setup);
@@ -161,6 +182,7 @@ pub fn files(session: &Session, control: &dyn Control, options: &NcOptions) -> R
             number: control.has_numbers().then(|| options.number() + number as u32 + 1),
             mounted_at: program.mounted_at.clone(),
             start: program.start.clone(),
+            centring: program.centring.clone(),
             feed: program.feed,
             minutes: program.minutes,
         });

@@ -21,7 +21,7 @@ pub struct NcOptions {
     pub feed_in_mm: f64,
     /// Distance along the tool from which a position is approached, mm.
     pub clearance_mm: f64,
-    /// Pause between two traversals, s.
+    /// Pause between two traversals, and rest at each target of an instrument that reads at rest, s.
     pub dwell_s: f64,
     /// Feed of approach and retreat, mm/min and °/min.
     pub approach_feed: f64,

@@ -36,6 +36,8 @@ pub(super) struct Path {
     pub overshoots: Vec<Vec<Vec<f64>>>,
     pub runs: usize,
     pub both_directions: bool,
+    /// How long the axes rest at each target, s; `None` of an instrument that reads along the motion.
+    pub rest_s: Option<f64>,
     /// The feed of the measured path and its unit.
     pub feed: (f64, &'static str),
     /// What the operator must know of it.
@@ -48,9 +50,12 @@ pub(super) struct Path {
 pub(super) struct Leg {
     pub vertices: Vec<Vec<f64>>,
     pub measured: bool,
+    /// How long the axes rest at each vertex, s; `None` if they go through.
+    pub rest_s: Option<f64>,
     shape: Shape,
 }
 
+#[derive(Clone)]
 enum Shape {
     /// One axis moves, at a feed in mm/min or °/min.
     Line(f64),
@@ -104,10 +109,16 @@ impl Path {
                 }
             }
         }
+        let rest_s = test.station.handling().reads_at_rest.then_some(options.dwell_s);
         if legs.iter().any(|leg| matches!(leg.shape, Shape::Segments { .. })) {
             remarks.push(format!("Segments with a chord error of at most {} um", options.chord_error_mm * 1e3));
         }
-        Ok(Path { legs, overshoots, runs, both_directions, feed, remarks, warnings })
+        Ok(Path { legs, overshoots, runs, both_directions, rest_s, feed, remarks, warnings })
+    }
+
+    /// Number of states of the measured path at which the axes rest.
+    pub fn targets(&self) -> usize {
+        self.legs.iter().filter(|leg| leg.rest_s.is_some()).map(|leg| leg.vertices.len()).sum()
     }
 
     /// The first state, with overshoot.
@@ -225,20 +236,24 @@ impl Leg {
         options: &NcOptions,
     ) -> Result<Leg, CodegenError> {
         let span = (range[1] - range[0]).abs();
+        let rest_s = (measured && test.station.handling().reads_at_rest).then_some(options.dwell_s);
+        let steps_of = |step: f64| (span / step).round().max(1.0) as usize;
         let (speed, radius) = match &test.motion {
-            Some(Motion::Sweep { axis, speed, .. }) => {
+            Some(Motion::Sweep { axis, step, speed, .. }) => {
                 let feed = 60.0 * machine.axes[*axis].kind.to_display(*speed);
-                return Ok(Leg { vertices: states(machine, test, range, 1)?, measured, shape: Shape::Line(feed) });
+                let vertices = states(machine, test, range, rest_s.map_or(1, |_| steps_of(*step)))?;
+                return Ok(Leg { vertices, measured, rest_s, shape: Shape::Line(feed) });
             }
             Some(Motion::Line { step, speed, in_turn, .. }) => {
                 // Axes that move in turn leave the line at every step.
-                let steps = if *in_turn { (span / step).round().max(1.0) as usize } else { 1 };
+                let steps = if *in_turn || rest_s.is_some() { steps_of(*step) } else { 1 };
                 let vertices = states(machine, test, range, steps)?;
-                return Ok(Leg { vertices, measured, shape: Shape::Line(60.0 * speed) });
+                return Ok(Leg { vertices, measured, rest_s, shape: Shape::Line(60.0 * speed) });
             }
-            Some(Motion::Circle { first, second, radius, speed, .. }) => {
+            Some(Motion::Circle { first, second, radius, step, speed, .. }) => {
                 // Half a turn at most: a block with equal ends means nothing or a whole turn, as the control has it.
-                let vertices = states(machine, test, range, (span / (0.9 * PI)).ceil().max(1.0) as usize)?;
+                let least = (span / (0.9 * PI)).ceil().max(1.0) as usize;
+                let vertices = states(machine, test, range, rest_s.map_or(least, |_| steps_of(*step).max(least)))?;
                 let whole = states(machine, test, [0.0, PI], 1);
                 let axes = [*first, *second];
                 if let (Some((plane, order)), Ok(whole)) = (plane(machine, axes), whole) {
@@ -257,7 +272,7 @@ impl Leg {
                             counterclockwise: forward != swapped,
                             feed: 60.0 * speed,
                         };
-                        return Ok(Leg { vertices, measured, shape });
+                        return Ok(Leg { vertices, measured, rest_s, shape });
                     }
                 }
                 (*speed, *radius)
@@ -265,11 +280,15 @@ impl Leg {
             Some(Motion::Follow { speed, .. }) => (*speed, 1.0),
             _ => return Err(CodegenError::Nc { message: "no motion".into(), help: "state one".into() }),
         };
-        let mut steps = (span / 2_f64.to_radians()).ceil().max(1.0) as usize;
+        let mut steps = match (rest_s, &test.motion) {
+            (Some(_), Some(Motion::Circle { step, .. } | Motion::Follow { step, .. })) => steps_of(*step),
+            _ => (span / 2_f64.to_radians()).ceil().max(1.0) as usize,
+        };
         let vertices = loop {
             let vertices = states(machine, test, range, steps)?;
             let error_mm = chord_error_mm(machine, test, &vertices);
-            if error_mm <= options.chord_error_mm {
+            // Between targets nothing is read.
+            if error_mm <= options.chord_error_mm || rest_s.is_some() {
                 break vertices;
             }
             // The error falls with the square of the step.
@@ -293,11 +312,36 @@ impl Leg {
         };
         let tool_points = (options.tool_point && follows)
             .then(|| vertices.iter().map(|state| tool_over_table(machine, test, state)).collect());
-        Ok(Leg { vertices, measured, shape: Shape::Segments { seconds, tool_points } })
+        Ok(Leg { vertices, measured, rest_s, shape: Shape::Segments { seconds, tool_points } })
     }
 
-    /// The blocks of the leg, from its first state to its last or back.
+    /// The blocks of the leg, from its first state to its last or back, with a rest at each state if it has rests.
     pub fn blocks(&self, letters: &[char], machine: &Machine, back: bool) -> Vec<Block> {
+        let Some(rest_s) = self.rest_s else { return self.through(letters, machine, back) };
+        let rest = Block::Dwell(rest_s);
+        let each = (0..self.vertices.len().saturating_sub(1)).map(|k| {
+            let k = if back { self.vertices.len() - 2 - k } else { k };
+            let mut blocks = self.part(k).through(letters, machine, back);
+            blocks.push(rest.clone());
+            blocks
+        });
+        std::iter::once(vec![rest.clone()]).chain(each).flatten().collect()
+    }
+
+    /// The part between the `k`-th state and the next.
+    fn part(&self, k: usize) -> Leg {
+        let shape = match &self.shape {
+            Shape::Segments { seconds, tool_points } => Shape::Segments {
+                seconds: *seconds,
+                tool_points: tool_points.as_ref().map(|points| points[k..k + 2].to_vec()),
+            },
+            other => other.clone(),
+        };
+        Leg { vertices: self.vertices[k..k + 2].to_vec(), measured: self.measured, rest_s: None, shape }
+    }
+
+    /// The blocks of the leg without a rest.
+    pub fn through(&self, letters: &[char], machine: &Machine, back: bool) -> Vec<Block> {
         let order: Vec<usize> =
             if back { (0..self.vertices.len()).rev().collect() } else { (0..self.vertices.len()).collect() };
         let display = |axis: usize, state: &[f64]| (letters[axis], machine.axes[axis].kind.to_display(state[axis]));

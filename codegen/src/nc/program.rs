@@ -31,6 +31,8 @@ pub struct Program {
     pub mounted_at: Vec<f64>,
     /// Positions of all axes where the motion begins, with overshoot, mm and degrees.
     pub start: Vec<f64>,
+    /// Positions of all axes at which the balls of a bar coincide, mm and degrees; `None` if they cannot.
+    pub centring: Option<Vec<f64>>,
     /// The feed of the measured path and its unit.
     pub feed: (f64, &'static str),
     /// Duration of all traversals with overshoot and pauses, min.
@@ -60,9 +62,8 @@ impl Program {
         draft.moves.extend(overshoots.map(|states| writer.moves("overshoot", Mounted::Bar, states.clone())));
         writer.retreat(&path, &start, &mut draft);
         let Draft { blocks, warnings, moves } = draft;
-        let kind = session.instrument.word();
         let mut title = vec![
-            format!("Machine {}, {}, {kind}", name(&machine.name), test_of(&test.name)),
+            format!("Machine {}, {}, {}", name(&machine.name), test_of(&test.name), test.station.kind().word()),
             "Positions are those of the axes in the session. The active work offset".into(),
             "and tool length must give them. This program changes neither.".into(),
         ];
@@ -70,7 +71,9 @@ impl Program {
         if !control.is_run() {
             title.push(format!("This form has not been run on a control. Syntax: {}", control.source()));
         }
-        let display = |at: &[f64]| machine.axes.iter().zip(at).map(|(axis, q)| axis.kind.to_display(*q)).collect();
+        let display = |at: &[f64]| -> Vec<f64> {
+            machine.axes.iter().zip(at).map(|(axis, q)| axis.kind.to_display(*q)).collect()
+        };
         Ok(Program {
             name: test.name.clone(),
             title,
@@ -78,6 +81,7 @@ impl Program {
             warnings,
             moves,
             mounted_at: display(&mounted_at),
+            centring: writer.centring(&start).map(|(_, centre)| display(&centre)),
             start: display(&start),
             feed: path.feed,
             minutes: path.minutes(machine, options.dwell_s),
@@ -143,6 +147,11 @@ impl Writer<'_> {
             .collect()
     }
 
+    /// What is taken off.
+    fn instrument(&self) -> &'static str {
+        self.test.station.handling().taken_off.unwrap_or("the instrument")
+    }
+
     fn line(&self, to: Vec<(char, f64)>, blocks: &mut Vec<Block>) {
         if !to.is_empty() {
             blocks.push(Block::Line { from: Vec::new(), to, feed: self.options.approach_feed });
@@ -173,6 +182,13 @@ impl Writer<'_> {
         let (workpiece, spindle) = balls(self.machine, &bar, at);
         let requested = std::array::from_fn(|i| spindle[i] - workpiece[i] + far[i] - near[i]);
         self.within(positions_for_bar(self.machine, &bar, at, requested)?)
+    }
+
+    /// The positions at which the balls of a bar coincide, with the rotary axes at the start, and those above them.
+    fn centring(&self, start: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
+        let bar = self.test.station.bar().map(|_| self.bar())?;
+        let centre = self.within(positions_for_bar(self.machine, &bar, start, [0.0; 3])?)?;
+        Some((self.retracted(&centre)?, centre))
     }
 
     /// The positions at which the bar is longer by the feed-in.
@@ -207,10 +223,16 @@ impl Writer<'_> {
                     .into(),
             );
         }
-        let off = if ball_bar { "Take the bar off" } else { "Take the instrument off" };
-        draft
-            .blocks
-            .push(Block::Stop(format!("{off}. Move the tool clear of table and fixtures. The axes turn to the start")));
+        if let Some(rest_s) = path.rest_s {
+            draft.warn(format!(
+                "The axes rest for {rest_s} s at each of {} targets: record one reading at each (ISO 230-2)",
+                path.targets()
+            ));
+        }
+        draft.blocks.push(Block::Stop(format!(
+            "Take {} off. Move the tool clear of table and fixtures. The axes turn to the start",
+            self.instrument()
+        )));
         let turned = self.all(start, AxisKind::Rotary);
         // A control that counts within one turn may take another place for such a position.
         let is_beyond = turned.iter().any(|(_, q)| !(0.0..360.0).contains(q));
@@ -222,10 +244,7 @@ impl Writer<'_> {
             draft.blocks.push(Block::Stop(check));
         }
         let mut here: Option<Vec<f64>> = None;
-        let centre = (ball_bar && !centred).then(|| self.bar()).and_then(|bar| {
-            let centre = self.within(positions_for_bar(self.machine, &bar, start, [0.0; 3])?)?;
-            Some((self.retracted(&centre)?, centre))
-        });
+        let centre = self.centring(start).filter(|_| !centred);
         if let Some((above, centre)) = centre {
             let blocks = &mut draft.blocks;
             blocks.push(Block::Comment(format!("Centring of the workpiece ball, setup {}", name(&self.test.setup))));
@@ -264,7 +283,10 @@ impl Writer<'_> {
         draft.moves.push(self.moves("approach", Mounted::Nothing, approach));
         let mount = match self.test.station.bar() {
             Some(bar) => format!("Mount the bar of {} mm", bar.bar),
-            None => "Bring the instrument into its measuring range".to_string(),
+            None => {
+                let begins = self.test.station.handling().begins;
+                begins.unwrap_or("Bring the instrument into its measuring range").to_string()
+            }
         };
         draft.blocks.push(Block::Stop(format!("{mount}. Start recording")));
         if first != start {
@@ -282,7 +304,8 @@ impl Writer<'_> {
             if run > 0 {
                 if !path.both_directions {
                     blocks.push(Block::Comment("Back to the start; not a run".into()));
-                    path.legs.iter().rev().for_each(|leg| blocks.extend(leg.blocks(&self.letters, self.machine, true)));
+                    let back = path.legs.iter().rev();
+                    back.for_each(|leg| blocks.extend(leg.through(&self.letters, self.machine, true)));
                 }
                 blocks.push(Block::Dwell(self.options.dwell_s));
             }
@@ -312,7 +335,7 @@ impl Writer<'_> {
             self.line(self.moved(end, &last, AxisKind::Linear), &mut draft.blocks);
             draft.moves.push(self.moves("feed-out", Mounted::Bar, vec![end.to_vec(), last.clone()]));
         }
-        draft.blocks.push(Block::Stop("Stop recording. Take the instrument off, and hold it".into()));
+        draft.blocks.push(Block::Stop(format!("Stop recording. Take {} off, and hold it", self.instrument())));
         match self.retracted(&last) {
             Some(above) => {
                 self.line(self.moved(&last, &above, AxisKind::Linear), &mut draft.blocks);

@@ -93,6 +93,8 @@ pub enum NextStep {
     AllDetermined,
     /// Nothing: no candidate test is known for the instrument.
     Nothing,
+    /// Nothing: no candidate test makes a confounded parameter identifiable.
+    NoneHelps,
 }
 
 /// Whether the result is good.

@@ -145,7 +145,13 @@ impl Instrument for Angle<f64> {
             Body::Tool => "Sensor of angles, on the tool",
             Body::Table => "Sensor of angles, on the table",
         };
-        Handling { beside: Some(format!("{on}: it reads about {} of R", about.join(" and "))), ..Handling::default() }
+        Handling {
+            beside: Some(format!("{on}: it reads about {} of R", about.join(" and "))),
+            taken_off: Some("the sensor of angles"),
+            begins: Some("Mount the sensor of angles, and set the reading to zero"),
+            reads_at_rest: true,
+            ..Handling::default()
+        }
     }
     fn absent_channels_known(&self, priors: &mut [Prior]) {
         let zero = |channel: usize| if channel < self.about.len() { Prior::Free } else { Prior::Known };

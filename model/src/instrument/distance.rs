@@ -160,7 +160,13 @@ impl Instrument for Distance<f64> {
     }
     fn handling(&self) -> Handling {
         let beside = (self.frame == StationFrame::Bed).then(|| "Station, fixed to the bed: its place is estimated".into());
-        Handling { beside, ..Handling::default() }
+        Handling {
+            beside,
+            taken_off: Some("the reflector"),
+            begins: Some("Mount the reflector, and let the beam find it"),
+            reads_at_rest: true,
+            ..Handling::default()
+        }
     }
     fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
         [Some(&mut self.station), Some(&mut self.reflector)]

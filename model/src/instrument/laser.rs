@@ -359,7 +359,13 @@ impl Instrument for Laser<f64> {
     fn handling(&self) -> Handling {
         let beam = direction_in_words(self.frame[0]);
         let beside = format!("Laser, its beam along {beam} of R and aligned over the whole travel");
-        Handling { beside: Some(beside), taken_off: Some("the optics"), ..Handling::default() }
+        Handling {
+            beside: Some(beside),
+            taken_off: Some("the optics"),
+            begins: Some("Mount the optics, align the beam, and set the reading to zero"),
+            reads_at_rest: true,
+            ..Handling::default()
+        }
     }
     fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
         [Some(&mut self.optic), Some(&mut self.reflector)]

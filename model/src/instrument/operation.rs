@@ -42,6 +42,10 @@ pub struct Handling {
     pub taken_off: Option<&'static str>,
     /// What is done between tests beside mounting objects: `changes of the bar`.
     pub changes: Option<&'static str>,
+    /// What is done at the start of the motion, before the recording starts: `Mount the optics, and align the beam`.
+    pub begins: Option<&'static str>,
+    /// Whether it reads while the axes rest, at each target (ISO 230-1, ISO 230-2), and not along the motion.
+    pub reads_at_rest: bool,
 }
 
 /// A move of one axis, for which an instrument is set up.

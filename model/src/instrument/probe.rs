@@ -272,7 +272,12 @@ impl Instrument for Probe<f64> {
         set_up::written(&keys, &[])
     }
     fn handling(&self) -> Handling {
-        Handling { probed: Some("artefact"), taken_off: Some("the stylus"), ..Handling::default() }
+        Handling {
+            probed: Some("artefact"),
+            taken_off: Some("the stylus"),
+            begins: Some("Bring the stylus to the surface"),
+            ..Handling::default()
+        }
     }
     fn contact(&self) -> Contact {
         Contact::Touching

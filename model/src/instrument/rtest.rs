@@ -342,7 +342,12 @@ impl Instrument for RTest<f64> {
     }
     fn handling(&self) -> Handling {
         let probed = (self.setting == Setting::Spindle).then_some("master ball");
-        Handling { probed, taken_off: Some("the nest with the sensors"), ..Handling::default() }
+        Handling {
+            probed,
+            taken_off: Some("the nest with the sensors"),
+            begins: Some("Bring the ball into the nest"),
+            ..Handling::default()
+        }
     }
     fn contact(&self) -> Contact {
         Contact::AtDistance(0.0)

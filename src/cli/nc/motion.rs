@@ -27,7 +27,7 @@ pub struct MotionArguments {
     /// Example: --clearance-mm 80
     #[arg(long, value_name = "MM", default_value_t = NcOptions::default().clearance_mm)]
     clearance_mm: f64,
-    /// Pause between two runs, s.
+    /// Pause between two runs, and rest at each target of an instrument that reads at rest, s.
     ///
     /// Example: --dwell-s 5
     #[arg(long, value_name = "S", default_value_t = NcOptions::default().dwell_s)]

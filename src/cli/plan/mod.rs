@@ -105,7 +105,10 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     if let Some(sizes) = &arguments.device_mm {
         analysis.warnings.extend(clearance::faults(&session, sizes)?);
     }
-    let commands = arguments.session.commands();
+    let noise = arguments.noise_um.map(|um| ("--noise-um", um.to_string()));
+    let planned = arguments.planned.then(|| ("--planned", String::new()));
+    let repeated: Vec<(&str, String)> = noise.into_iter().chain(planned).collect();
+    let commands = arguments.session.commands("plan", &repeated);
     let stated = StatedPlan::of_plan(&problem, &analysis);
     let report = report::plan::analysis::report(&problem, &stated, &commands, common.output.figures())?;
     common.output.put(&outputs, &report, &stated, &read)

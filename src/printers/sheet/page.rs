@@ -39,7 +39,7 @@ pub(super) fn page(session: &Session, sheet: &TestSheet, order: &Order, [number,
                     h2 { "Mount" }
                     ul { @for mount in &sheet.mounts { li { (mount) } } }
                     (points(sheet))
-                    (centring(session, sheet))
+                    (centring(session, sheet, order))
                 }
                 div { (drawing) }
             }
@@ -122,8 +122,10 @@ fn points(sheet: &TestSheet) -> Markup {
 }
 
 /// Where the spindle cup takes the workpiece ball.
-fn centring(session: &Session, sheet: &TestSheet) -> Markup {
-    let Some(at) = &sheet.centring else {
+fn centring(session: &Session, sheet: &TestSheet, order: &Order) -> Markup {
+    // The program centres where its motion begins, with overshoot.
+    let at = order.run(&sheet.name).map_or(&sheet.centring, |run| &run.centring);
+    let Some(at) = at else {
         return html! {
             @if sheet.bar_mm.is_some() {
                 p { "The spindle does not reach the centre of the workpiece ball: place it by measurement." }
@@ -147,7 +149,7 @@ fn axes(axes: &[AxisRange]) -> Table {
             Cell::or_dash(axis.room().map(|room| Cell::fixed(room, 1)))
         ]
     });
-    Table::new(["axis", ">start", ">measured path", "unit", ">travel", ">least distance from its end"], rows)
+    Table::new(["axis", ">first reading", ">measured path", "unit", ">travel", ">least distance from its end"], rows)
 }
 
 /// The least clearance and where it is.

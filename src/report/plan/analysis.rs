@@ -3,7 +3,7 @@
 use abbe::document::StatedPlan;
 use abbe::identify::IdentifyError;
 use abbe::identify::problem::Problem;
-use abbe::identify::statements::has_candidates;
+use abbe::identify::results::NextStep;
 use abbe::model::words::counted;
 use abbe::plan::results::{ErrorAnalysis, PlanAnalysis};
 
@@ -12,7 +12,7 @@ use super::{
     budgets, clearances, correlation, effects, indices, sensitivity as sensitivities, small_plots, uncertainties,
 };
 use crate::report::block::{KeyFigure, Level, Report, Text};
-use crate::report::commands::Commands;
+use crate::report::commands::{Commands, SIMULATED};
 use crate::report::confounded::{BY_PRIOR, by_prior};
 use crate::report::figure::bars::{Bars, Fill};
 use crate::report::figure::{Chart, Figure, Quantity};
@@ -58,7 +58,7 @@ pub fn report(
     undeclared(&mut report, analysis);
     report.section("Next");
     let all = "list sensitivities, budgets, correlations, indices, tests, effects";
-    report.steps(next(problem, analysis, commands), (commands.command("plan", "--all"), all));
+    report.steps(next(stated.statements.measure.step, commands), (commands.command("plan", "--all"), all));
     let each = analysis.leave_one_out.iter().map(|without| without.why.clone());
     report.headed(Level::Detail, "Contribution of each test:", Text::List(each.collect()));
     report.section("Sensitivity");
@@ -228,18 +228,15 @@ fn undeclared(report: &mut Report, analysis: &PlanAnalysis) {
 }
 
 /// What to do next.
-fn next(problem: &Problem, analysis: &PlanAnalysis, commands: &Commands) -> Vec<(String, String)> {
-    let mut steps: Vec<(String, String)> = Vec::new();
-    let mut step = |options: &str, purpose: &str| steps.push((commands.command("plan", options), purpose.to_string()));
-    if has_candidates(problem) {
-        let purpose = if analysis.unidentifiable.is_empty() {
-            "propose the test that most lowers the largest uncertainty"
-        } else {
-            "propose the test that makes the errors identifiable"
-        };
-        step("--improve", purpose);
-        step("--separate A,B", "propose the test that best separates two effects");
-    }
-    steps.push((commands.command("simulate", "--out run1"), "simulate readings of these tests".into()));
+fn next(step: NextStep, commands: &Commands) -> Vec<(String, String)> {
+    let purpose = match step {
+        NextStep::Improve => Some("propose the test that most lowers the largest uncertainty"),
+        NextStep::Identify => Some("propose the test that makes the errors identifiable"),
+        _ => None,
+    };
+    let propose = |purpose: &str| (commands.command("plan", "--improve"), purpose.to_string());
+    let mut steps: Vec<(String, String)> = purpose.map(propose).into_iter().collect();
+    let simulated = commands.command("simulate", &format!("--out {}", commands.beside(SIMULATED)));
+    steps.push((simulated, "simulate readings of these tests".into()));
     steps
 }

@@ -52,7 +52,35 @@ fn a_probe_has_to_be_one_that_scans() {
     assert!(message.contains("warning: test \"1a\": The stylus stays at the surface"), "{message}");
     let program = std::fs::read_to_string(out.join("1a.nc")).unwrap();
     assert!(program.contains("(THE STYLUS STAYS AT THE SURFACE"), "{program}");
-    assert!(program.contains("TAKE THE INSTRUMENT OFF. MOVE"), "{program}");
+    assert!(program.contains("TAKE THE STYLUS OFF. MOVE"), "{program}");
+}
+
+/// A laser and a level read at rest: the axes stop at each target, on the way there and back, and the remarks have the words of
+/// the instrument. A ball bar reads along the motion.
+#[test]
+fn instruments_that_read_at_rest_have_a_stop_at_each_target() {
+    let place = tempfile::tempdir().unwrap();
+    for (plan, rests) in [("laser/plan.toml", true), ("angle/plan.toml", true), ("hermle-c600u/chapter5.toml", false)] {
+        let out = place.path().join(plan.replace('/', "-"));
+        let run = abbe(&["nc", text(&ready(plan)), "--control", "linuxcnc", "--out", text(&out), "--dwell-s", "4"]);
+        let message = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert!(run.status.success(), "{message}");
+        assert_eq!(message.contains("rest for 4 s at each of"), rests, "{message}");
+        for file in
+            std::fs::read_dir(&out).unwrap().map(|file| file.unwrap().path()).filter(|file| !file.ends_with("main.ngc"))
+        {
+            let program = std::fs::read_to_string(&file).unwrap();
+            assert_eq!(program.contains("the bar"), !rests, "{program}");
+            for path in program.split("(Measured path begins)").skip(1) {
+                let path = path.split("(Measured path ends)").next().unwrap();
+                let [moves, stops] =
+                    ["G1 ", "G4 P4"].map(|word| path.lines().filter(|line| line.starts_with(word)).count());
+                // One more target than ways between them.
+                assert_eq!(stops, if rests { moves + 1 } else { 0 }, "{}: {path}", file.display());
+                assert!(!rests || moves > 1, "{path}");
+            }
+        }
+    }
 }
 
 /// What the programs only remark, the terminal says too: an overshoot that the travel cuts short, a ball that no axis

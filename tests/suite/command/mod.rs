@@ -9,6 +9,7 @@ pub mod interrupted;
 pub mod kept;
 pub mod kill;
 pub mod new;
+pub mod printed_commands;
 pub mod repeatability;
 pub mod standard_output;
 pub mod supply_chain;

@@ -87,6 +87,30 @@ fn sheets_name_programs_and_where_they_start() {
     }
 }
 
+/// The balls coincide where the program centres them: with the rotary axes where its motion begins, overshoot included.
+#[test]
+fn the_sheet_centres_where_the_program_does() {
+    let mut compared = 0;
+    for plan in ["hermle-c600u/chapter5.toml", "table-and-head/session.toml", "tilting-head/session.toml"] {
+        let page = page(plan, &["--control", "siemens"]);
+        for test in page.split("<h1>Test ").skip(1) {
+            let rotary = |words: &str| {
+                let after = test.split_once(words)?.1;
+                let text: String = after.split('<').filter(|part| part.contains('\u{a0}')).take(1).collect();
+                let text = text.rsplit('>').next()?.to_string();
+                let of_axis = |part: &str| part.trim().ends_with('°').then(|| part.trim().to_string());
+                Some(text.split(", ").filter_map(of_axis).collect::<Vec<String>>())
+            };
+            let (Some(coincide), Some(begins)) = (rotary("Both balls coincide at "), rotary("Motion begins at")) else {
+                continue;
+            };
+            assert!(!coincide.is_empty() && coincide == begins, "{plan}: {coincide:?} {begins:?}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 3, "{compared}");
+}
+
 /// A travel of 10⁹ degrees is none, and a file is not replaced unasked.
 #[test]
 fn no_travel_is_not_stated_and_files_stay() {

@@ -13,7 +13,8 @@ impl Path {
         let traversals = self.runs * if self.both_directions { 2 } else { 1 };
         // In one direction alone the axes go back between two runs.
         let ways = if self.both_directions { traversals } else { 2 * traversals - 1 };
-        once * ways as f64 + dwell_s / 60.0 * (traversals - 1) as f64
+        let rests_s = self.rest_s.unwrap_or(0.0) * (self.targets() * traversals) as f64;
+        once * ways as f64 + dwell_s / 60.0 * (traversals - 1) as f64 + rests_s / 60.0
     }
 }
 
@@ -48,7 +49,7 @@ mod tests {
     /// One way through a leg of each kind. The machine has the axes X, Y and C in this order.
     fn minutes(shape: Shape, vertices: &[[f64; 3]]) -> f64 {
         let vertices = vertices.iter().map(|state| state.to_vec()).collect();
-        let leg = Leg { vertices, measured: true, shape };
+        let leg = Leg { vertices, measured: true, rest_s: None, shape };
         let machine = Machine::from_code("w C b X Y t").unwrap();
         let place = |name: &str| machine.axis_index(name).unwrap();
         let order = [place("X"), place("Y"), place("C")];
@@ -63,6 +64,7 @@ mod tests {
             overshoots: Vec::new(),
             runs: 1,
             both_directions: false,
+            rest_s: None,
             feed: (0.0, ""),
             remarks: Vec::new(),
             warnings: Vec::new(),
