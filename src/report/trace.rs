@@ -82,6 +82,8 @@ pub fn report(
     conformity::section(&mut report, result.conformity.as_ref());
     let by_prior = &result.outcome.determined_by_prior;
     confounded::section(&mut report, &result.unobservable, by_prior, (&result.outliers, result.reading_unit));
+    let presumed = "Location errors that rest on the absence of a motion, which no reading separates from them:";
+    report.headed(Level::Detail, presumed, Text::List(result.presumed.clone()));
     report.section("Next");
     report.headed(Level::Key, "Tests that separate an effect from its aliases:", Text::List(measure_next(result)));
     let page = "write residuals, plots and alternatives as a page";
@@ -195,8 +197,7 @@ fn key_figures(trace: &TraceOutcome, before: &Quality<'_>, after: &Quality<'_>) 
     match result.effects.as_slice() {
         [] => {}
         [one] if one.unique => {
-            let among = format!("among {} detectable candidates", integer(result.candidates_detectable));
-            figures.push(KeyFigure::new("Uniqueness", "unique", among));
+            figures.push(KeyFigure::new("Uniqueness", "unique", format!("among {}", uniqueness::screened(result))));
         }
         [one] => {
             let count = format!("1 of {}", one.explanation_count);

@@ -262,9 +262,11 @@ fn named(problem: &Problem, rank: &Rank, error: IdentifyError) -> IdentifyError 
     IdentifyError::NoConvergence { iterations, sum_of_squares, step, along }
 }
 
-/// Degrees of freedom of χ², at least 1. Each prior counts as an observation.
+/// Degrees of freedom of χ², at least 1. Each prior counts as an observation, each estimated position of a step as a
+/// parameter.
 fn freedom(problem: &Problem, rank: &Rank) -> usize {
-    (problem.scalars() + problem.prior_rows()).saturating_sub(rank.identifiable_basis.ncols()).max(1)
+    let estimated = rank.identifiable_basis.ncols() + problem.parameters.positions().count();
+    (problem.scalars() + problem.prior_rows()).saturating_sub(estimated).max(1)
 }
 
 /// The rank at the nominal machine, and the parameters and triangular factors of its linearisation. The priors of

@@ -21,6 +21,7 @@ impl Symmetric {
     pub fn of(matrix: MatRef<'_, f64>) -> Result<Symmetric, IdentifyError> {
         match matrix.nrows() {
             0..3 if !matrix.is_all_finite() => Err(IdentifyError::Decomposition),
+            0 => Ok(Symmetric { values: Vec::new(), vectors: Mat::new() }),
             1 => Ok(Symmetric { values: vec![matrix[(0, 0)]], vectors: Mat::identity(1, 1) }),
             2 => Ok(Symmetric::of_two(matrix)),
             _ => {

@@ -30,6 +30,7 @@ pub mod simulate;
 pub mod statements;
 pub mod targets;
 pub mod trace;
+pub mod trace_claims;
 pub mod trace_reported;
 pub mod tracker_blunders;
 pub mod validate_command;
