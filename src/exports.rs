@@ -5,6 +5,7 @@ use abbe_apply::compensation::curves::of_model;
 use abbe_apply::compensation::{self, Compensation, MAX_POINTS, TableFormat};
 use abbe_apply::control::{CONTROLS, Control, Kinematics};
 use abbe_apply::export::dh::{self, DhTable, DhUncertainty};
+use abbe_apply::export::entries::{Remaining, best_locations};
 use abbe_apply::export::kinematics::{ENTRIES, EntryChoice, KinematicTable};
 use abbe_apply::export::neutral::{self, AxisPlace};
 use abbe_apply::export::travel::Travel;
@@ -148,6 +149,10 @@ pub struct ExportResult {
     /// Changes of a control's kinematic parameters.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kinematics: Option<KinematicTable>,
+    /// Of a description without the effects of the model: the volumetric error over the range of its readings without
+    /// changes, with the location errors of the model, and with those that are written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remaining: Option<Remaining>,
     /// How the control reads compensation tables.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub import: Vec<String>,
@@ -236,7 +241,9 @@ fn tabled(header: String, table: Table, result: ExportResult) -> Result<Exported
 }
 
 fn of_urdf(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, ApplyError> {
-    let result = ExportResult { left_out: left_out(model), ..ExportResult::default() };
+    let tool_mm = if options.patch.is_some() { model.tool_mm } else { options.tool_mm };
+    let (_, remaining) = best_locations(model, tool_mm)?;
+    let result = ExportResult { left_out: left_out(model), remaining, ..ExportResult::default() };
     let text = match &options.patch {
         Some((source, tip)) => urdf_patch::patched(model, source, tip.as_deref())?,
         None => urdf::urdf(model, options.tool_mm)?,
@@ -262,9 +269,11 @@ fn of_dh(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, A
         dh_u: found.u,
         dh_covariance: found.covariance,
         left_out: left_out(model),
+        remaining: best_locations(model, options.tool_mm)?.1,
         ..ExportResult::default()
     };
-    tabled(present::dh_header(&table), table, result)
+    let stated = result.remaining.map_or(String::new(), |remaining| format!("# {}\n", remaining.words()));
+    tabled(stated + &present::dh_header(&table), table, result)
 }
 
 fn of_control(model: &IdentifiedModel, control: &Control, options: &ExportOptions) -> Result<Exported, ApplyError> {

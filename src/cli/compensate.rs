@@ -8,9 +8,11 @@ use std::path::PathBuf;
 use abbe::apply::correction::Correction;
 use abbe::apply::correction::stream::{self, Output, Summary};
 use abbe::files::{self, commands::CommandFile};
-use abbe::identify::model_file;
 use abbe::identify::model_file::errors::EstimatedErrors;
+use abbe::identify::model_file::{self, IdentifiedModel, ModelParameter};
 use abbe::model::pose::Aim;
+use abbe::model::session::Prior;
+use abbe::model::words::first_of;
 use clap::Args;
 
 use super::failure::Failure;
@@ -42,7 +44,8 @@ pub struct CompensateArguments {
     /// Example: --tool-mm 0,0,-120
     #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_hyphen_values = true)]
     tool_mm: Vec<f64>,
-    /// Position of an axis without a column, mm or degrees [default: 0]; may be repeated.
+    /// Position of an axis without a column, mm or degrees [default: 0]; may be repeated. Of poses: the positions from which
+    /// the first row is reached, and with them the branch of the joints.
     ///
     /// Example: --at A=30
     #[arg(long = "at", value_name = "AXIS=POSITION", allow_hyphen_values = true)]
@@ -84,10 +87,30 @@ pub fn run(arguments: &CompensateArguments) -> Result<(), Failure> {
         return Err(Failure::Interrupted("interrupted; nothing is written".into()));
     }
     written?;
-    let mut report = present::report(&arguments.out, &summary, correction.aim);
-    report.warnings.extend(file.warning().map(str::to_string));
+    let of_model = arguments.tool_mm.is_empty();
+    let mut warnings: Vec<String> = fitted_tool(&model).filter(|_| of_model).into_iter().collect();
+    warnings.extend(file.warning().map(str::to_string));
+    let report = present::report(&arguments.out, &summary, correction.aim, of_model, warnings);
     arguments.output.put(&outputs, &report, &summary, &Read::files(source.stamp.iter().chain([file.stamp()])))
 }
+
+/// A warning if the tool point of the model is the target of the instrument, which no one stated and the fit placed.
+fn fitted_tool(model: &IdentifiedModel) -> Option<String> {
+    let is_of_tool = |id: &str| id.starts_with("target.") || id.starts_with("spindle_ball.");
+    let free = |own: &&ModelParameter| is_of_tool(&own.id) && own.prior == Prior::Free && !own.held;
+    let placed: Vec<String> = (model.parameters.iter().filter(free))
+        .map(|own| format!("{} by {:.1} µm", own.id, own.value * own.unit.display_per_internal))
+        .collect();
+    (!placed.is_empty()).then(|| {
+        format!(
+            "the tool point is the target of the instrument, which the fit placed ({}): --tool-mm states the point of the tool",
+            first_of(&placed, MAX_NAMED, ", ", "further coordinate")
+        )
+    })
+}
+
+/// Coordinates that the warning names.
+const MAX_NAMED: usize = 3;
 
 /// A writer that fails after Ctrl-C, so that the temporary file behind it is removed.
 struct UntilInterrupted<'w> {

@@ -7,16 +7,28 @@ use abbe::model::pose::Aim;
 use abbe::model::words::{counted, with_exponent};
 
 use super::block::Report;
+use super::number::fixed;
 use super::table::{Cell, Table, cells};
 
-/// The report of corrected commands in this file.
-pub fn report(file: &Path, summary: &Summary, aim: Aim) -> Report {
+/// The report of corrected commands in this file; `of_model`, whether the tool point is that of the model.
+pub fn report(file: &Path, summary: &Summary, aim: Aim, of_model: bool, warnings: Vec<String>) -> Report {
     let mut report = Report::new("Corrected commands");
+    report.warnings = warnings;
     report.method =
         "The machine with its errors puts the tool where the machine without errors would be at the commanded \
                      positions."
             .to_string();
-    report.opening("", [format!("{}: {}", file.display(), headline(summary, aim))]);
+    let [x, y, z] = summary.tool_mm.map(|mm| fixed(mm, 3));
+    report.opening(
+        "",
+        [
+            format!("{}: {}", file.display(), headline(summary, aim)),
+            format!(
+                "Tool point [{x}, {y}, {z}] mm in the tool frame{}.",
+                if of_model { ", from the model" } else { "" }
+            ),
+        ],
+    );
     report.key(states(summary));
     report.key(marked(summary));
     report
@@ -49,7 +61,7 @@ fn states(summary: &Summary) -> Table {
         }
     };
     size("largest error at the commands", Some(summary.largest_error_um), Some(summary.largest_error_arcsec));
-    size("largest remaining error", summary.largest_remaining_um, summary.largest_remaining_arcsec);
+    size("largest remaining error of all rows", summary.largest_remaining_um, summary.largest_remaining_arcsec);
     Table::new(["", ">position", ">orientation"], rows)
 }
 

@@ -24,6 +24,9 @@ pub fn report(machine: &str, files: &[PathBuf], table: Option<Table>, result: &E
     table.into_iter().for_each(|table| report.key(table));
     result.import.iter().for_each(|line| report.key(line.clone()));
     result.left_out.iter().for_each(|missing| report.key(format!("left out: {missing}")));
+    if let Some(remaining) = &result.remaining {
+        report.key(remaining.words());
+    }
     report
 }
 

@@ -26,6 +26,9 @@ pub struct ErrorCurve {
     pub axis: usize,
     /// The positions through which the axis moved while readings observed the error, mm or rad.
     pub range: Range<f64>,
+    /// The position at which the error counts as zero: the first one of the range, if the range does not contain the zero
+    /// of the axis. There the model is an extrapolation, and its error no measured one.
+    pub zero: Option<f64>,
     terms: Vec<(Effect, Vec<f64>)>,
     /// The indices of the terms' coefficients and estimated numbers among the model's parameters, term by term.
     unknowns: Vec<usize>,
@@ -37,6 +40,16 @@ impl ErrorCurve {
     /// The derivatives of the error by the unknowns of all terms at a position (mm or rad), approached in a direction (+1
     /// or −1).
     fn basis(&self, position: f64, direction: f64) -> Vec<f64> {
+        let mut basis = self.basis_of_model(position, direction);
+        for (zero, towards) in self.zero.into_iter().flat_map(|zero| [(zero, 1.0), (zero, -1.0)]) {
+            let reference = self.basis_of_model(zero, towards);
+            basis.iter_mut().zip(reference).for_each(|(own, reference)| *own -= 0.5 * reference);
+        }
+        basis
+    }
+
+    /// The same of the model, whose error is zero where its functions are.
+    fn basis_of_model(&self, position: f64, direction: f64) -> Vec<f64> {
         let sample = DriverSample { value: position, direction, ..DriverSample::default() };
         let mut basis = Vec::with_capacity(self.unknowns.len());
         for (effect, coefficients) in &self.terms {
@@ -45,8 +58,15 @@ impl ErrorCurve {
         basis
     }
 
-    /// The error at a position (mm or rad), approached in a direction (+1 or −1), mm or rad.
+    /// The error at a position (mm or rad), approached in a direction (+1 or −1), mm or rad, less the mean of both
+    /// directions at [`ErrorCurve::zero`].
     pub fn at(&self, position: f64, direction: f64) -> f64 {
+        let reference = self.zero.map_or(0.0, |zero| 0.5 * (self.of_model(zero, 1.0) + self.of_model(zero, -1.0)));
+        self.of_model(position, direction) - reference
+    }
+
+    /// The same of the model, whose error is zero where its functions are.
+    fn of_model(&self, position: f64, direction: f64) -> f64 {
         let sample = DriverSample { value: position, direction, ..DriverSample::default() };
         let mut basis = Vec::new();
         let mut sum = 0.0;
@@ -173,10 +193,18 @@ pub fn of_model(model: &IdentifiedModel) -> Compensation {
                 kind.unit()
             ));
         }
+        let zero = (!(range[0]..=range[1]).contains(&0.0)).then_some(range[0]);
+        if let Some(zero) = zero.map(|zero| kind.to_display(zero)) {
+            result.left_out.push(format!(
+                "{error} at {zero:.3} {}: the zero of the table; at 0 the error is not measured",
+                kind.unit()
+            ));
+        }
         result.curves.push(ErrorCurve {
             error: error.clone(),
             axis,
             range: range[0]..range[1],
+            zero,
             terms: vec![term],
             unknowns: unknowns.collect(),
             covariance: Vec::new(),

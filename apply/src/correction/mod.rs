@@ -10,8 +10,10 @@
 //! chain. `J⁺` is that of the machine without errors at the commanded position. The slopes of the errors, a few parts in
 //! 10⁵ of the travel, follow from the steps themselves (Broyden). The errors are evaluated again at every `q′`.
 //!
-//! The deviation and its Jacobian are those of [`abbe_model::pose`]; [`stream`] corrects files of commands.
+//! The deviation and its Jacobian are those of [`abbe_model::pose`]; `nearest` corrects rows near a singularity;
+//! [`stream`] corrects files of commands.
 
+mod nearest;
 pub mod stream;
 
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
@@ -34,8 +36,10 @@ const CONVERGENCE_RAD: f64 = 1e-12;
 /// Ratio of the largest to the smallest singular value of the Jacobian from which a position is near a singularity.
 /// Angles count as arcs at a radius of 1 m.
 pub const NEAR_SINGULAR: f64 = 1e3;
-/// Largest correction of an axis, mm or mm at a radius of 1 m. A larger one is no correction of geometric errors.
-const LARGEST_CORRECTION_MM: f64 = 50.0;
+/// Largest correction of an axis, mm or mm at a radius of 1 m (5.7°). A larger one is no correction of geometric errors.
+const LARGEST_CORRECTION_MM: f64 = 100.0;
+/// Share of the deviation at the command up to which a command that does not remove it is better.
+const BETTER: f64 = 0.9;
 /// Distance from the command at which the iteration ends, mm or mm at a radius of 1 m: it may pass the limit on its way.
 const LARGEST_DISTANCE_MM: f64 = 1000.0;
 
@@ -49,7 +53,9 @@ pub enum State {
     PositionOnly,
     /// Corrected near a singularity by a machine without linear axes that could correct the position alone.
     NearSingular,
-    /// No command removes the error here: a singularity, or errors too large. The command is unchanged.
+    /// No command near it removes the error: a singularity, or errors too large. This command leaves less of it.
+    Reduced,
+    /// The same, and no command near it leaves less. The command is unchanged.
     NotCorrectable,
     /// The corrected command lies beyond the travel of an axis.
     BeyondTravel,
@@ -66,6 +72,7 @@ impl State {
             State::Corrected => "corrected",
             State::PositionOnly => "position-only",
             State::NearSingular => "near-singular",
+            State::Reduced => "reduced",
             State::NotCorrectable => "not-correctable",
             State::BeyondTravel => "beyond-travel",
             State::NotANumber => "not-a-number",
@@ -181,6 +188,7 @@ impl Correction<'_> {
                 wanted: Pose::nominal(machine, &state, self.tool_mm),
                 aim,
                 state: if !number || singular { Progress::Failed } else { Progress::Open },
+                reduced: false,
                 remaining: [f64::INFINITY; 2],
                 number,
                 inverse,
@@ -227,6 +235,7 @@ impl Correction<'_> {
             let [mm, rad] = row.remaining;
             row.state == Progress::Failed || mm.is_nan() || mm > TOLERANCE_MM || rad > TOLERANCE_RAD
         };
+        let mut astray = Vec::new();
         for (number, row) in rows.iter_mut().enumerate() {
             let columns = || machine.axes.iter().zip(positions.positions.iter().zip(&commanded.positions));
             let too_long = columns().any(|(axis, (column, command))| {
@@ -236,6 +245,23 @@ impl Correction<'_> {
                 row.state = Progress::Failed;
                 for (column, command) in positions.positions.iter_mut().zip(&commanded.positions) {
                     column[number] = command[number];
+                }
+                if row.number && row.aim == self.aim {
+                    astray.push(number);
+                }
+            }
+        }
+        if !astray.is_empty() {
+            let lengths = nearest::settle(self, commanded, &mut positions, (&mut rows, &astray), errors)?;
+            for (number, [before, after]) in astray.iter().zip(lengths) {
+                let row = &mut rows[*number];
+                row.state = Progress::Done;
+                row.reduced = failed(row) && after < BETTER * before;
+                if failed(row) && !row.reduced {
+                    row.state = Progress::Failed;
+                    for (column, command) in positions.positions.iter_mut().zip(&commanded.positions) {
+                        column[*number] = command[*number];
+                    }
                 }
             }
         }
@@ -265,6 +291,7 @@ impl Correction<'_> {
                 let condition = row.inverse.condition;
                 let state = match () {
                     () if !row.number => State::NotANumber,
+                    () if row.reduced => State::Reduced,
                     () if !corrected => State::NotCorrectable,
                     () if beyond => State::BeyondTravel,
                     () if row.aim != self.aim => State::PositionOnly,
@@ -296,6 +323,8 @@ struct Row {
     remaining: [f64; 2],
     state: Progress,
     number: bool,
+    /// Whether its command leaves less of the deviation, although not nothing.
+    reduced: bool,
 }
 
 impl Row {

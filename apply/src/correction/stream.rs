@@ -53,11 +53,13 @@ pub struct Summary {
     pub largest_error_um: f64,
     /// Largest error of the orientation before, arcsec.
     pub largest_error_arcsec: f64,
-    /// Largest remaining error of the position among corrected rows, µm; `null` for errors.
+    /// Largest remaining error of the position among all rows, those that keep their command included, µm; `null` for
+    /// errors.
     pub largest_remaining_um: Option<f64>,
-    /// Largest remaining error of the orientation among the same rows without those in the state `position-only`,
-    /// arcsec; `null` for errors.
+    /// The same of the orientation, arcsec; `null` for errors.
     pub largest_remaining_arcsec: Option<f64>,
+    /// The tool point that the correction presumes, in the tool frame, mm.
+    pub tool_mm: [f64; 3],
     /// The first rows that are not simply corrected.
     pub marked: Vec<MarkedRow>,
 }
@@ -114,7 +116,7 @@ pub fn run(
         .into());
     }
     write(to, layout.header(file).as_bytes())?;
-    let mut summary = Summary::default();
+    let mut summary = Summary { tool_mm: correction.tool_mm, ..Summary::default() };
     let mut last = start.to_vec();
     let mut waiting: Option<(Block, Vec<bool>)> = None;
     loop {
@@ -372,9 +374,7 @@ impl Summary {
                 self.largest_error_um = self.largest_error_um.max(*before_um);
                 self.largest_error_arcsec = self.largest_error_arcsec.max(*before_arcsec);
             }
-            if output == Output::Command && usable && *state == State::PositionOnly {
-                self.largest_remaining_um = Some(self.largest_remaining_um.unwrap_or(0.0).max(*um));
-            } else if output == Output::Command && usable && *state != State::NotCorrectable {
+            if output == Output::Command && usable {
                 let most = |so_far: Option<f64>, value: f64| Some(so_far.unwrap_or(0.0).max(value));
                 self.largest_remaining_um = most(self.largest_remaining_um, *um);
                 self.largest_remaining_arcsec = most(self.largest_remaining_arcsec, *arcsec);

@@ -23,7 +23,8 @@ use serde::Serialize;
 
 use super::dh_frames::{self, Frames};
 use super::dh_nominal;
-use super::frames::{location_errors, roll_pitch_yaw, tool_side};
+use super::entries::best_locations;
+use super::frames::{roll_pitch_yaw, tool_side};
 use crate::ApplyError;
 
 /// One joint.
@@ -173,7 +174,7 @@ pub fn tables(
         let table = DhTable { base: FixedPose::of(&found.base), joints, tool: FixedPose::of(&found.tool) };
         Ok((table, rows.into_iter().flatten().collect()))
     };
-    let errors = location_errors(model);
+    let (errors, _) = best_locations(model, tool_mm)?;
     let (calibrated, _) = of_errors(&errors)?;
     let (nominal_table, _) = of_errors(&zero)?;
     let mut columns: Vec<(usize, DVector<f64>)> = Vec::new();
@@ -193,11 +194,15 @@ pub fn tables(
     let jacobian = DMatrix::from_fn(count, columns.len(), |i, j| columns[j].1[i]);
     let own = DMatrix::from_fn(columns.len(), columns.len(), |i, j| model.covariance[(columns[i].0, columns[j].0)]);
     let covariance = &jacobian * own * jacobian.transpose();
-    let is_determined = |i: usize| {
+    // An origin may lie anywhere on its axis: of axes that are nearly parallel the other parameters follow it a little.
+    let along_null = |i: usize| {
         let along = |null: &Vec<f64>| columns.iter().map(|(index, column)| column[i] * null[*index]).sum::<f64>();
-        model.null_directions.iter().all(|null| along(null).abs() < UNDETERMINED)
+        model.null_directions.iter().map(|null| along(null).powi(2)).sum::<f64>()
     };
-    let u = |i: usize| is_determined(i).then(|| covariance[(i, i)].max(0.0).sqrt());
+    let u = |i: usize| {
+        let (variance, open) = (covariance[(i, i)].max(0.0), along_null(i));
+        (open < variance.max(UNDETERMINED.powi(2))).then(|| (variance + open).sqrt())
+    };
     let uncertainty = |(joint, name): (usize, &String)| {
         let [a_mm, alpha_deg, beta_deg, theta_deg, d_mm] = std::array::from_fn(|k| u(5 * joint + k));
         DhUncertainty { axis: name.clone(), a_mm, alpha_deg, beta_deg, theta_deg, d_mm }

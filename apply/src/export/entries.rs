@@ -14,14 +14,17 @@
 //! there what the travel does not determine.
 
 use abbe_model::chain::ERRORS_PER_AXIS;
+use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::driver::Driver;
 use abbe_model::effect::Effect;
 use abbe_model::frames::Point;
+use abbe_model::session::Prior;
 use abbe_model::session::readings::Readings;
 use nalgebra::{DMatrix, DVector, Vector3};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::frames::location_errors;
 use super::travel::Travel;
 use crate::ApplyError;
 use crate::compare::workspace::point_by;
@@ -36,6 +39,8 @@ use abbe_model::pose::Aim;
 
 /// Iterations. The displacements are small against the machine: the second step is already below a nanometre.
 const ITERATIONS: usize = 3;
+/// Least length of a vector of the set-up beside the others, of its own.
+const LEAST_SHARE: f64 = 1e-4;
 /// Least eigenvalue over the largest of the directions of displacements that the travel determines.
 const LEAST_EIGENVALUE: f64 = 1e-8;
 
@@ -48,6 +53,18 @@ pub struct Remaining {
     pub plain: Size,
     /// With the entries that are written.
     pub written: Size,
+}
+
+impl Remaining {
+    /// What the entries leave, in a sentence.
+    pub fn words(&self) -> String {
+        let [without, plain, written] =
+            [self.without, self.plain, self.written].map(|size| format!("{:.1}", size.rms_um));
+        format!(
+            "the model is {without} um rms over the range of its readings; the plain location errors leave {plain}, those \
+             written, which leave least without the effects, {written}, the whole model with its effects 0"
+        )
+    }
 }
 
 /// An error that the control's model does not represent.
@@ -67,6 +84,8 @@ pub(super) struct Lines<'m> {
     weights: Vec<f64>,
     /// The slots of the displacements.
     slots: Vec<usize>,
+    /// Vectors of what is set up anew with the machine, orthonormal: no error.
+    set_up: Vec<Vec<Vector3<f64>>>,
     /// The volumetric error, centred.
     error: Vec<Vector3<f64>>,
     /// Its derivative by each displacement, centred.
@@ -76,6 +95,37 @@ pub(super) struct Lines<'m> {
 /// Whether an effect is a function of positions, so that it has a value everywhere in the travel.
 fn follows_position(effect: &Effect) -> bool {
     matches!(effect.driver, Driver::Axis(_) | Driver::None) && effect.shape.fits_position_table()
+}
+
+/// The location errors by slot that a description without effects states, mm and rad, and what they leave: those of the
+/// model, or where it has effects of positions, those that leave least of its volumetric error over the range of its
+/// readings.
+///
+/// # Errors
+/// If an error of the model cannot be evaluated there.
+pub fn best_locations(model: &IdentifiedModel, tool_mm: [f64; 3]) -> Result<(Vec<f64>, Option<Remaining>), ApplyError> {
+    let mut errors = location_errors(model);
+    let estimated = |name: &ErrorName| model.machine.error_slot(name).filter(|_| name.kind == ErrorKind::Location);
+    let of_errors = model.parameters.iter().filter(|parameter| parameter.role == Role::Error && !parameter.held);
+    let slots: Vec<usize> = of_errors.filter_map(|own| estimated(&ErrorName::parse(&own.id)?)).collect();
+    if slots.is_empty() || !model.carried_effects().any(|effect| follows_position(&model.effects[effect])) {
+        return Ok((errors, None));
+    }
+    let (free, none) = (vec![true; slots.len()], vec![0.0; slots.len()]);
+    let plain: Vec<f64> = slots.iter().map(|slot| errors[*slot]).collect();
+    let mut lines = Lines::of(model, slots.clone(), &Travel::measured(model), tool_mm)?;
+    if model.parameters.iter().any(|own| own.role == Role::Setup && own.prior == Prior::Free) {
+        lines = lines.with_free_set_up();
+    }
+    let best = lines.best(&plain, &free);
+    let [without, of_plain, written] = [&none, &plain, &best].map(|entries| lines.remaining(entries));
+    // What the travel hardly determines is not improved by steps of first order.
+    let is_better = written.rms_um < of_plain.rms_um;
+    if is_better {
+        slots.iter().zip(best).for_each(|(slot, value)| errors[*slot] = value);
+    }
+    let written = if is_better { written } else { of_plain };
+    Ok((errors, Some(Remaining { without, plain: of_plain, written })))
 }
 
 impl<'m> Lines<'m> {
@@ -95,16 +145,60 @@ impl<'m> Lines<'m> {
         let correction = Correction { machine: &model.machine, errors: &errors, tool_mm, aim: Aim::Position };
         let error = correction.pose_errors(&grid)?.into_iter().map(|six| Vector3::new(six[0], six[1], six[2]));
         let error = error.collect();
-        let mut lines = Lines { model, tool_mm, error: Vec::new(), by_line: Vec::new(), grid, weights, slots };
-        lines.error = lines.centred(error);
-        lines.by_line = lines.slots.iter().map(|slot| lines.by_slot(*slot)).collect();
+        let (set_up, by_line) = (Vec::new(), Vec::new());
+        let mut lines = Lines { model, tool_mm, error, by_line, grid, weights, slots, set_up };
+        lines.centre();
         Ok(lines)
     }
 
-    /// Vectors less their mean: the zero of the workpiece.
+    /// The same where base and tool are set up anew: a rotation of the base and an offset of the tool point are no errors.
+    pub fn with_free_set_up(mut self) -> Lines<'m> {
+        let machine = &self.model.machine;
+        let none = machine.body_errors(|_| false, |_| 0.0);
+        let point = |row: usize, offset: usize| {
+            let mut state = Vec::new();
+            self.grid.state(machine, row, &mut state);
+            let mut tool = self.tool_mm;
+            if let Some(coordinate) = tool.get_mut(offset) {
+                *coordinate += 1.0;
+            }
+            Vector3::from(machine.table_point(&state, &none, machine.tool_point(&state, &none, Point(tool))).0)
+        };
+        const NO_OFFSET: usize = 3;
+        let places = parallel::map(self.grid.rows(), &|row| point(row, NO_OFFSET));
+        let turns = [Vector3::x(), Vector3::y(), Vector3::z()]
+            .map(|about| places.iter().map(|place| about.cross(place)).collect::<Vec<_>>());
+        let offsets = [0, 1, 2].map(|offset| {
+            let moved = parallel::map(self.grid.rows(), &|row| point(row, offset));
+            moved.iter().zip(&places).map(|(moved, place)| moved - place).collect::<Vec<_>>()
+        });
+        for vectors in turns.into_iter().chain(offsets) {
+            let before = self.product(&vectors, &vectors);
+            let mut vectors = self.centred(vectors);
+            let norm = self.product(&vectors, &vectors).sqrt();
+            if norm > LEAST_SHARE * before.sqrt() {
+                vectors.iter_mut().for_each(|vector| *vector /= norm);
+                self.set_up.push(vectors);
+            }
+        }
+        self.centre();
+        self
+    }
+
+    /// Takes what is no error off the error and its derivatives.
+    fn centre(&mut self) {
+        self.error = self.centred(std::mem::take(&mut self.error));
+        self.by_line = self.slots.iter().map(|slot| self.by_slot(*slot)).collect();
+    }
+
+    /// Vectors less their mean, the zero of the workpiece, and less what is set up anew.
     fn centred(&self, mut vectors: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
         let mean: Vector3<f64> = vectors.iter().zip(&self.weights).map(|(vector, weight)| vector * *weight).sum();
         vectors.iter_mut().for_each(|vector| *vector -= mean);
+        for set_up in &self.set_up {
+            let share = self.product(&vectors, set_up);
+            vectors.iter_mut().zip(set_up).for_each(|(vector, own)| *vector -= own * share);
+        }
         vectors
     }
 

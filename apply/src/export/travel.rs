@@ -11,6 +11,10 @@ use abbe_identify::model_file::IdentifiedModel;
 
 /// Places along a rotary axis, odd.
 const ROTARY_PLACES: usize = 13;
+/// Rotary axes that turn up to which a grid has all combinations of places; of more, positions fill the range evenly.
+const MOST_ROTARY: usize = 3;
+/// Number of these positions.
+const SAMPLES: usize = 3000;
 /// Places along a linear axis, odd. Errors of location are linear along it, and the squares of these are integrated
 /// without error.
 const LINEAR_PLACES: usize = 3;
@@ -56,6 +60,15 @@ impl Travel {
         Ok(self)
     }
 
+    /// A position of a sequence that fills the range evenly: the golden ratio's generalisation (Roberts 2018, "The
+    /// unreasonable effectiveness of quasirandom sequences").
+    fn sample(&self, number: usize) -> Vec<f64> {
+        let dimensions = self.ranges.len() as f64;
+        let root = (0..40).fold(2.0_f64, |root, _| (1.0 + root).powf(1.0 / (dimensions + 1.0)));
+        let share = |axis: usize| (0.5 + (number + 1) as f64 * root.powi(-(axis as i32 + 1))).fract();
+        self.ranges.iter().enumerate().map(|(axis, [from, to])| from + share(axis) * (to - from)).collect()
+    }
+
     /// The ranges as results state them.
     pub fn axes(&self, model: &IdentifiedModel) -> Vec<AxisRange> {
         model.machine.axes.iter().zip(&self.ranges).map(|(axis, range)| AxisRange::of(axis, *range)).collect()
@@ -65,7 +78,15 @@ impl Travel {
     /// travel and the ends are among the positions.
     pub fn grid(&self, model: &IdentifiedModel) -> (Readings, Vec<f64>) {
         let (mut positions, mut weights) = (vec![Vec::new()], vec![1.0]);
-        for (axis, [from, to]) in model.machine.axes.iter().zip(&self.ranges) {
+        let turning = model.machine.axes.iter().zip(&self.ranges);
+        let is_rotary = |axis: &abbe_model::axis::Axis| axis.kind == abbe_model::axis::AxisKind::Rotary;
+        let is_large = turning.filter(|(axis, [from, to])| is_rotary(axis) && to > from).count() > MOST_ROTARY;
+        if is_large {
+            positions = (0..SAMPLES).map(|number| self.sample(number)).collect();
+            weights = vec![1.0 / SAMPLES as f64; SAMPLES];
+        }
+        let axes = model.machine.axes.iter().zip(&self.ranges).filter(|_| !is_large);
+        for (axis, [from, to]) in axes {
             let places = match (to > from, axis.kind) {
                 (false, _) => vec![(*from, 1.0)],
                 (true, abbe_model::axis::AxisKind::Rotary) => simpson(*from, *to, ROTARY_PLACES),

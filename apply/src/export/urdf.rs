@@ -11,7 +11,8 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use nalgebra::Isometry3;
 
-use super::frames::{Branch, location_errors, roll_pitch_yaw, tool_side, workpiece_side};
+use super::entries::best_locations;
+use super::frames::{Branch, roll_pitch_yaw, tool_side, workpiece_side};
 use super::left_out;
 use crate::ApplyError;
 use abbe_identify::model_file::IdentifiedModel;
@@ -27,7 +28,7 @@ const MASS_KG: f64 = 1.0;
 /// If the machine's error angles are small-angle matrices.
 pub fn urdf(model: &IdentifiedModel, tool_mm: [f64; 3]) -> Result<String, ApplyError> {
     let machine = &model.machine;
-    let errors = location_errors(model);
+    let (errors, remaining) = best_locations(model, tool_mm)?;
     let mut text = String::from("<?xml version=\"1.0\"?>\n");
     let mut line = |indent: usize, what: std::fmt::Arguments<'_>| {
         let _ = writeln!(text, "{:indent$}{what}", "");
@@ -38,6 +39,9 @@ pub fn urdf(model: &IdentifiedModel, tool_mm: [f64; 3]) -> Result<String, ApplyE
     if !missing.is_empty() {
         let list = missing.join(", ").replace("--", "- -");
         line(0, format_args!("<!-- Not part of a fixed geometry, and left out: {list} -->"));
+    }
+    if let Some(remaining) = remaining {
+        line(0, format_args!("<!-- {} -->", remaining.words()));
     }
     line(0, format_args!("<robot name=\"{}\">", escaped(&machine.name)));
     link(&mut line, "base");

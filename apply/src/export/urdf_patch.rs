@@ -12,7 +12,8 @@ use abbe_identify::model_file::IdentifiedModel;
 use abbe_model::axis::AxisKind;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use super::frames::{JointFrame, location_errors, roll_pitch_yaw, tool_side};
+use super::entries::best_locations;
+use super::frames::{JointFrame, roll_pitch_yaw, tool_side};
 use crate::ApplyError;
 
 /// Metres per millimetre.
@@ -32,7 +33,7 @@ pub fn patched(model: &IdentifiedModel, source: &Source, tip: Option<&str>) -> R
     let (path, _) = file.path(&source.file, tip)?;
     let chain = file.chain(&source.file, tip)?;
     refuse_another(model, &chain)?;
-    let branch = tool_side(&model.machine, &location_errors(model), [0.0; 3])?;
+    let branch = tool_side(&model.machine, &best_locations(model, model.tool_mm)?.0, [0.0; 3])?;
     let mut text = source.text.clone();
     let mut changes: Vec<(&UrdfJoint, Isometry3<f64>)> = Vec::new();
     let mut before = Isometry3::identity();

@@ -39,6 +39,17 @@ pub struct Inverse {
 impl Inverse {
     /// At axis positions without errors.
     pub fn at(machine: &Machine, state: &[AxisPosition<f64>], tool_mm: [f64; 3], aim: Aim, axes: &[usize]) -> Inverse {
+        Inverse::damped(machine, state, (tool_mm, aim), axes, 0.0)
+    }
+
+    /// The same with a damping, mm per mm: directions whose singular value is smaller are hardly moved along.
+    pub fn damped(
+        machine: &Machine,
+        state: &[AxisPosition<f64>],
+        (tool_mm, aim): ([f64; 3], Aim),
+        axes: &[usize],
+        damping: f64,
+    ) -> Inverse {
         let mut columns = SMatrix::<f64, 6, MAX_AXES>::zeros();
         for (column, axis) in axes.iter().enumerate().take(MAX_AXES) {
             let derivative = derivative(machine, state, tool_mm, aim, *axis) / lever_mm(machine.axes[*axis].kind);
@@ -54,7 +65,7 @@ impl Inverse {
         for k in &order[..aim.rank()] {
             if eigen.eigenvalues[*k] > LOST * LOST * largest {
                 let vector = eigen.eigenvectors.column(*k);
-                inverse += vector * vector.transpose() / eigen.eigenvalues[*k];
+                inverse += vector * vector.transpose() / (eigen.eigenvalues[*k] + damping * damping);
             }
         }
         let condition = if smallest > LOST * LOST * largest { (largest / smallest).sqrt() } else { f64::INFINITY };
@@ -85,7 +96,7 @@ impl Inverse {
 }
 
 /// A deviation as lengths: angles as arcs.
-fn arcs(deviation: &Vector6<f64>) -> Vector6<f64> {
+pub fn arcs(deviation: &Vector6<f64>) -> Vector6<f64> {
     let mut arcs = *deviation;
     arcs.fixed_rows_mut::<3>(3).scale_mut(LEVER_MM);
     arcs

@@ -327,3 +327,39 @@ fn columns_and_rows_of_commands_are_read_or_named() {
         "{written}"
     );
 }
+
+/// A laser measures X from 100 to 500 mm: the zero of the axis is not among the positions, and the error at it an
+/// extrapolation. The table is zero at its first entry, with a small uncertainty.
+#[test]
+fn a_table_away_from_the_zero_of_its_axis_begins_with_zero() {
+    let folder = tempfile::tempdir().unwrap();
+    let error_um = |x: f64| 7.0 + 0.03 * x + 1e-4 * x * x;
+    let mut rows = "run,x_mm,deviation_um\n".to_string();
+    for run in 0..2 {
+        for k in 0..=16 {
+            let x = 100.0 + 25.0 * f64::from(if run == 0 { k } else { 16 - k });
+            let noise = 0.05 * (x * 12.9898 + f64::from(run)).sin();
+            rows.push_str(&format!("{},{x},{:.4}\n", run + 1, error_um(x) + noise));
+        }
+    }
+    std::fs::write(folder.path().join("x.csv"), rows).unwrap();
+    let session = folder.path().join("session.toml");
+    let text_of = "[machine]\nchain = \"w b X Y Z t\"\naxis.X = {}\naxis.Y = {}\naxis.Z = {}\n\
+        [instrument]\nkind = \"laser\"\nnoise_um = 0.05\n[unknowns]\nerrors = []\n\
+        [[effect]]\ncomponent = \"EXX\"\nshape = \"polynomial\"\norder = 2\n\
+        [[test]]\nname = \"LX\"\ndata = \"x.csv\"\nreflector_mm = [0, 0, 0]\nbeam = [1, 0, 0]\n";
+    std::fs::write(&session, text_of).unwrap();
+    let out = folder.path().join("tables");
+    let run = exported(&session, &["--as", "linuxcnc-tables", "--out", text(&out), "--places", "17"]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let printed = String::from_utf8(run.stdout).unwrap();
+    assert!(printed.contains("EXX at 100.000 mm: the zero of the table"), "{printed}");
+    let table = std::fs::read_to_string(out.join("X.comp")).unwrap();
+    let rows: Vec<Vec<f64>> = table.lines().map(|line| numbers(&line.replace("# u", ""))).collect();
+    assert_eq!((rows.len(), rows[0][0]), (17, 100.0));
+    for row in rows {
+        let expected_mm = 1e-3 * (error_um(row[0]) - error_um(100.0));
+        assert!((row[1] - row[0] - expected_mm).abs() < 1e-4, "{row:?}: {expected_mm}");
+        assert!(row[3] < 1e-4, "{row:?}");
+    }
+}
