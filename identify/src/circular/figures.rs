@@ -6,7 +6,8 @@
 //! ```
 //!
 //! The standard permits the least-squares circle in place of the minimum-zone circles (clause 3). This module uses the
-//! least-squares circle, so G is never smaller than with minimum-zone circles.
+//! least-squares circle, so G is never smaller than with minimum-zone circles. G of one direction is the smaller of the ranges
+//! about its own circle and about that of both directions: both are bounds of the minimum zone, and no G exceeds G(b).
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -54,6 +55,15 @@ pub(super) fn figures(machine: &Arc<Machine>, test: &Test, path: &Path) -> Circu
             arc.to_degrees()
         ));
     }
+    // Both directions as one path: those there, then those back.
+    let both = match &traces {
+        [Some((there, _)), Some((back, _))] => {
+            let both = PolarPath(there.0.iter().chain(&back.0).copied().collect());
+            let (centre, deviations_mm) = radial_deviations_mm(path, &both);
+            Some((both, centre, deviations_mm, there.0.len()))
+        }
+        _ => None,
+    };
     let directions = traces
         .iter()
         .zip([("+", 1.0), ("-", -1.0)])
@@ -61,11 +71,16 @@ pub(super) fn figures(machine: &Arc<Machine>, test: &Test, path: &Path) -> Circu
             let (trace, runs) = trace.as_ref()?;
             let (_, deviations_mm) = radial_deviations_mm(path, trace);
             let (least, most) = range(&deviations_mm);
+            // The circle through both directions may be nearer to the minimum zone of one than its own.
+            let about_both = both.as_ref().map_or(f64::INFINITY, |(_, _, deviations_mm, there)| {
+                let (one, other) = deviations_mm.split_at(*there);
+                length(if sign > 0.0 { one } else { other })
+            });
             Some(DirectionFigures {
                 set_up_u: FigureUncertainties::of(path, trace, &deviations_mm, &set_up),
                 direction: direction.to_string(),
                 runs: *runs,
-                circular_deviation_um: (most - least) * 1e3,
+                circular_deviation_um: (most - least).min(about_both) * 1e3,
                 radial_deviation_max_um: most * 1e3,
                 radial_deviation_min_um: least * 1e3,
                 synchronous_error_motion_um: is_error_motion.then_some((most - least) * 1e3),
@@ -90,12 +105,10 @@ pub(super) fn figures(machine: &Arc<Machine>, test: &Test, path: &Path) -> Circu
         not_identifiable,
         set_up_u: FigureUncertainties::default(),
     };
-    match &traces {
-        [Some((there, _)), Some((back, _))] => {
-            let both = PolarPath(there.0.iter().chain(&back.0).copied().collect());
-            let (centre, deviations_mm) = radial_deviations_mm(path, &both);
-            let (least, most) = range(&deviations_mm);
-            result.set_up_u = FigureUncertainties::of(path, &both, &deviations_mm, &set_up);
+    match (&traces, &both) {
+        ([Some((there, _)), Some((back, _))], Some((both, centre, deviations_mm, _))) => {
+            let (least, most) = range(deviations_mm);
+            result.set_up_u = FigureUncertainties::of(path, both, deviations_mm, &set_up);
             result.bidirectional_circular_deviation_um = Some((most - least) * 1e3);
             result.mean_bidirectional_radial_deviation_um = Some(centre.radius_mm * 1e3);
             let differences = there.0.iter().filter_map(|p| Some((p.deviation_mm - back.at(p.angle)?).abs()));

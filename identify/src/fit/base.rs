@@ -46,6 +46,10 @@ pub enum Gauge {
     SetUp,
 }
 
+/// Component of the direction of an axis above which an error in this direction is one along or about the axis. Directions
+/// of robots have components of rounding across them.
+const OWN_SHARE: f64 = 0.5;
+
 impl Gauge {
     /// The parameters in the order in which they are preferably held.
     fn preference(self, machine: &Machine, list: &[Parameter]) -> Vec<usize> {
@@ -60,7 +64,8 @@ impl Gauge {
         let own = |parameter: &Parameter| {
             let name = ErrorName::parse(&parameter.id).filter(|_| self == Gauge::OwnDirection);
             let axis = name.as_ref().and_then(|name| machine.axis_index(&name.axis));
-            name.zip(axis).is_some_and(|(name, axis)| machine.axes[axis].direction[name.freedom.index() % 3] != 0.0)
+            name.zip(axis)
+                .is_some_and(|(name, axis)| machine.axes[axis].direction[name.freedom.index() % 3].abs() > OWN_SHARE)
         };
         let mut order: Vec<usize> = (0..list.len()).collect();
         order.sort_by_cached_key(|j| (kind(&list[*j]), own(&list[*j]), natural(&list[*j].id)));

@@ -31,7 +31,7 @@ use crate::unit::ARCSEC;
 const HIGHEST_ORDER: usize = 8;
 /// Largest part of a parameter's column that its term may leave, of its length.
 const PROPORTIONAL: f64 = 1e-6;
-/// Largest share of a null-space direction in a term that has a value.
+/// Largest share of a null-space combination in a term that has a value.
 const SEPARABLE: f64 = 1e-6;
 
 /// The terms of a fit.
@@ -70,11 +70,11 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<PointingTerms, IdentifyErr
         let pairs = of.iter().flat_map(|a| of.iter().map(move |b| (a, b)));
         let variance: f64 = pairs.map(|((i, a), (j, b))| a * b * covariance[(*i, *j)]).sum();
         let length = of.iter().map(|(j, factor)| (factor * sizes[*j]).powi(2)).sum::<f64>().sqrt();
-        let null = &fit.rank.null_space;
-        let share = |direction: usize| -> f64 {
-            of.iter().map(|(j, factor)| factor * sizes[*j] * null[(*j, direction)]).sum::<f64>().abs() / length
+        // The combinations that are reported as confounded: a null direction itself contains a little of every term.
+        let share = |combination: &Vec<f64>| -> f64 {
+            of.iter().map(|(j, factor)| factor * sizes[*j] * combination[*j]).sum::<f64>().abs() / length
         };
-        let has_value = (0..null.ncols()).all(|direction| share(direction) < SEPARABLE);
+        let has_value = fit.rank.null_combinations.iter().all(|combination| share(combination) < SEPARABLE);
         let number = |internal: f64| has_value.then_some(internal * ARCSEC);
         let u = variance.max(0.0).sqrt();
         found.push(PointingTerm {

@@ -1,19 +1,30 @@
 //! The spectrum of a residual by order over an angle.
 //!
 //! Each order `h` is fitted separately, `a + b·cos hφ + c·sin hφ`. `S` is its sum of squares beyond the constant, over
-//! `n` readings. The amplitude is `√(2·S/n)`. Over whole turns this is the amplitude of the Fourier series. Over a part
-//! of a turn it never exceeds the residual.
+//! `n` readings. The amplitude is `√(2·S/n)`. Over whole turns this is the amplitude of the Fourier series.
+//!
+//! Over a part of a turn the orders are not orthogonal, and one order would appear in all others. The order that explains
+//! most is then fitted first, and further ones beside it as long as they are significant; these orders have the amplitude
+//! of their joint fit, the others that of a separate fit to what it leaves. No amplitude exceeds the residual.
+
+use std::f64::consts::FRAC_PI_2;
 
 use abbe_model::axis::AxisKind;
 use faer::Mat;
 
 use super::SessionSeries;
 use crate::numerics::parallel;
+use crate::numerics::regression::Regression;
 use crate::numerics::solve::solve_square;
 use crate::problem::Problem;
 
 /// The highest order. Higher orders are seldom geometric errors.
 pub const HIGHEST_ORDER: usize = 40;
+
+/// Part of a turn without readings from which the orders are fitted together, degrees.
+const LARGEST_GAP_DEG: f64 = 20.0;
+/// Most orders that are fitted together.
+const MOST_JOINT: usize = 8;
 
 /// Spectrum of the residuals before and after.
 #[derive(Clone, Debug)]
@@ -30,6 +41,79 @@ pub struct Spectrum {
 
 /// The amplitude of each order from 1 in values over an angle in degrees; `channels` values per reading.
 pub fn amplitudes(angle_deg: &[f64], values: &[f64], channels: usize) -> Vec<f64> {
+    match has_gap(angle_deg) {
+        true => beside_each_other(angle_deg, values, channels),
+        false => separate(angle_deg, values, channels),
+    }
+}
+
+/// Whether angles leave a part of a turn out.
+fn has_gap(angle_deg: &[f64]) -> bool {
+    let mut turned: Vec<f64> = angle_deg.iter().map(|angle| angle.rem_euclid(360.0)).collect();
+    turned.sort_by(f64::total_cmp);
+    let (Some(first), Some(last)) = (turned.first(), turned.last()) else { return false };
+    let across = first + 360.0 - last;
+    turned.windows(2).map(|pair| pair[1] - pair[0]).fold(across, f64::max) > LARGEST_GAP_DEG
+}
+
+/// The amplitudes of a joint fit of the significant orders, and of a separate fit of the others to what it leaves.
+fn beside_each_other(angle_deg: &[f64], values: &[f64], channels: usize) -> Vec<f64> {
+    let count = angle_deg.len();
+    let mean_square = |values: &[f64]| {
+        let mean = |c: usize| values.iter().skip(c).step_by(channels).sum::<f64>() / count.max(1) as f64;
+        let means: Vec<f64> = (0..channels).map(mean).collect();
+        values.iter().enumerate().map(|(i, value)| (value - means[i % channels]).powi(2)).sum::<f64>()
+            / count.max(1) as f64
+    };
+    let most = (2.0 * mean_square(values)).sqrt();
+    let mut residual = values.to_vec();
+    let mut joint: Vec<(usize, f64)> = Vec::new();
+    while joint.len() < MOST_JOINT {
+        let found = separate(angle_deg, &residual, channels);
+        let others = (1..=found.len()).filter(|order| joint.iter().all(|(own, _)| own != order));
+        let Some(next) = others.max_by(|a, b| found[a - 1].total_cmp(&found[b - 1])) else { break };
+        let (gain, left) = (0.5 * found[next - 1].powi(2), mean_square(&residual));
+        // `−ln P` of a gain in noise, over all orders.
+        let price = 2.0 * (1e3 * HIGHEST_ORDER as f64).ln() * channels as f64;
+        if count as f64 * gain <= price * (left - gain).max(f64::MIN_POSITIVE) {
+            break;
+        }
+        let orders: Vec<usize> = joint.iter().map(|(own, _)| *own).chain([next]).collect();
+        let Some((amplitudes, rest)) = jointly(angle_deg, values, channels, &orders) else { break };
+        joint = orders.into_iter().zip(amplitudes).collect();
+        residual = rest;
+    }
+    let mut amplitudes = separate(angle_deg, &residual, channels);
+    for (order, amplitude) in joint {
+        amplitudes[order - 1] = amplitude;
+    }
+    amplitudes.iter().map(|amplitude| amplitude.min(most)).collect()
+}
+
+/// The joint fit of some orders: their amplitudes, and what it leaves; `None` if the arc does not separate them.
+fn jointly(angle_deg: &[f64], values: &[f64], channels: usize, orders: &[usize]) -> Option<(Vec<f64>, Vec<f64>)> {
+    let columns = || {
+        let wave = |order: usize, phase: f64| {
+            angle_deg.iter().map(move |angle| (order as f64 * angle.to_radians() - phase).cos()).collect::<Vec<f64>>()
+        };
+        let waves = orders.iter().flat_map(move |order| [wave(*order, 0.0), wave(*order, FRAC_PI_2)]);
+        std::iter::once(vec![1.0; angle_deg.len()]).chain(waves).collect::<Vec<_>>()
+    };
+    let mut squares = vec![0.0; orders.len()];
+    let mut rest = vec![0.0; values.len()];
+    for channel in 0..channels {
+        let own: Vec<f64> = values.iter().skip(channel).step_by(channels).copied().collect();
+        let solved = Regression::solve(columns(), &own)?;
+        for (k, square) in squares.iter_mut().enumerate() {
+            *square += solved.beta[1 + 2 * k].powi(2) + solved.beta[2 + 2 * k].powi(2);
+        }
+        rest.iter_mut().skip(channel).step_by(channels).zip(&solved.residual).for_each(|(to, from)| *to = *from);
+    }
+    Some((squares.into_iter().map(f64::sqrt).collect(), rest))
+}
+
+/// The amplitude of each order by itself.
+fn separate(angle_deg: &[f64], values: &[f64], channels: usize) -> Vec<f64> {
     parallel::map(HIGHEST_ORDER, &|place| {
         let order = place + 1;
         let basis: Vec<[f64; 3]> = angle_deg
@@ -123,6 +207,23 @@ mod tests {
         for (k, found) in amplitudes(&angle, &values, 1).into_iter().enumerate() {
             let wanted = if k + 1 == 2 { 1.5 } else { 0.0 };
             assert!((found - wanted).abs() < 1e-6, "order {}: {found}", k + 1);
+        }
+    }
+
+    /// Over half a turn a large first order does not appear in the second: both have their own amplitudes.
+    #[test]
+    fn orders_over_a_part_of_a_turn_are_fitted_together() {
+        for arc in [180, 220] {
+            let angle: Vec<f64> = (0..=arc).map(f64::from).collect();
+            let noise = |a: f64| 0.2 * (a * 12.9898).sin() * (a * 78.233).cos();
+            let of =
+                |a: &f64| 30.0 * (a.to_radians() + 0.4).cos() + 1.8 * (2.0 * a.to_radians() - 1.0).cos() + noise(*a);
+            let values: Vec<f64> = angle.iter().map(of).collect();
+            let found = amplitudes(&angle, &values, 1);
+            assert!((24.0..31.0).contains(&found[0]), "{found:?}");
+            assert!((found[1] - 1.8).abs() < 0.4, "{found:?}");
+            assert!(found[2..].iter().all(|amplitude| *amplitude < 0.2), "{found:?}");
+            assert!(separate(&angle, &values, 1)[1] > 5.0, "the orders are not orthogonal over this arc");
         }
     }
 

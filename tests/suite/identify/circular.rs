@@ -452,3 +452,24 @@ fn a_short_arc_is_reported_as_an_arc() {
     let direction = &test["directions"][0];
     assert!((um(direction, "circular_deviation_um") - 3.0).abs() < 0.06, "{test}");
 }
+
+/// One direction with a few high places: its own least-squares circle is farther from the minimum zone than that of both
+/// directions. Both directions together never lie in a narrower ring than one of them.
+#[test]
+fn both_directions_are_no_narrower_than_one() {
+    for seed in 0..6 {
+        let folder = tempfile::tempdir().unwrap();
+        let place = |k: usize| (f64::from(seed) * 12.9898 + k as f64 * 78.233).sin();
+        let test = circle(folder.path(), &[1.0, -1.0], false, |at| {
+            let bump = |centre: f64| (-((at.angle - centre) / 0.15).powi(2)).exp();
+            let there = 4e-3 * bump(PI + place(1)) + 3e-3 * bump(PI + place(2) * 2.0);
+            let back = 4e-3 * bump(1.0 + place(3));
+            let radial = if at.path > 0.0 { there } else { back };
+            [radial * at.angle.cos(), radial * at.angle.sin()]
+        });
+        let both = um(&test, "bidirectional_circular_deviation_um");
+        for direction in test["directions"].as_array().unwrap() {
+            assert!(um(direction, "circular_deviation_um") <= both + 1e-9, "{seed}: {both} {direction}");
+        }
+    }
+}
