@@ -288,7 +288,12 @@ fn checked(
         false => Session { noise_mm: session.noise_mm.or(Some(NOISE_MM)), ..session.clone() },
     };
     let found = match fit::prepare(&stated, 1) {
-        Ok((problem, fit)) => plausibility::examine(&problem, &fit),
+        Ok((problem, fit)) => {
+            let mut found = plausibility::examine(&problem, &fit);
+            // A noise that no one stated says nothing about the unit.
+            found.conflicts.retain(|conflict| conflict.kind != ConflictKind::Unit || session.noise_mm.is_some());
+            found
+        }
         Err(error @ IdentifyError::Contradicted { .. }) if !allow_implausible && !explained => return Err(error),
         Err(error) => {
             warnings.push(format!("the session is not fitted yet: {error}"));

@@ -72,7 +72,7 @@ pub fn add_monte_carlo(
         }
     }
     phases_follow_amplitudes(&mut result.parameters);
-    let goodness = result.outcome.goodness.verdict;
+    let goodness = result.outcome.goodness;
     result.conformity = conformity(&problem.session, &result.parameters, &result.circular, result.noise_um, goodness);
     result.covariance = fit::covariance_of_parameters(problem, fit, &result.parameters);
     if unconverged > 0 {

@@ -28,7 +28,7 @@ pub use cross_validation::{CrossValidation, TestNotLeftOut};
 pub use monte_carlo::{DrawnParameter, FitMonteCarlo, Verdict};
 pub use outcome::{
     Assumption, AssumptionKind, AssumptionVerdict, DataRange, DeterminedByPrior, Goodness, GoodnessVerdict,
-    NotEstimated, Outcome, TraceVerdict,
+    NotEstimated, NotJudged, Outcome, TraceVerdict,
 };
 pub(crate) use parameter::{COVERAGE_FACTOR, phases_follow_amplitudes};
 pub use parameter::{

@@ -24,7 +24,7 @@ use crate::problem::Problem;
 use crate::results::validation::{MovedParameter, ValidationResult, ValidationVerdict};
 use crate::results::{
     AxisCorrection, Covariance, DeterminedBy, Finding, FitResult, GoodStatement, Goodness, GoodnessVerdict,
-    LineQuantity, MeasureStatement, NextStep, ParameterResult, Statements, TraceResult, Unobservable,
+    LineQuantity, MeasureStatement, NextStep, NotJudged, ParameterResult, Statements, TraceResult, Unobservable,
     ValidationStatement,
 };
 use crate::tolerance::Conformity;
@@ -40,7 +40,7 @@ impl Statements {
     /// Of a fit.
     pub fn of_fit(problem: &Problem, result: &FitResult) -> Statements {
         let goodness = result.outcome.goodness;
-        let measure = match base_step(&result.plausibility, goodness.verdict) {
+        let measure = match base_step(&result.plausibility, goodness) {
             Some(step) => step,
             None if !has_candidates(problem) => NextStep::Nothing,
             None if result.unobservable.is_empty() => NextStep::Improve,
@@ -55,6 +55,7 @@ impl Statements {
             good: good(goodness, result.conformity.as_ref()),
             further: further(problem, &result.parameters),
             correct: corrections(&problem.session.machine, &result.parameters, &result.covariance),
+            changed: Vec::new(),
             measure,
         }
     }
@@ -71,7 +72,7 @@ impl Statements {
                 effect: Some(effect.name.meaning.clone()),
             },
             _ => {
-                let step = match base_step(&result.plausibility, goodness.verdict) {
+                let step = match base_step(&result.plausibility, goodness) {
                     // The search has been made.
                     Some(NextStep::Trace) | None if !has_candidates(problem) => NextStep::Nothing,
                     Some(NextStep::Trace) | None if result.unobservable.is_empty() => NextStep::Improve,
@@ -85,6 +86,7 @@ impl Statements {
             good: GoodStatement { verdict: Some(result.verdict), ..good(goodness, result.conformity.as_ref()) },
             further: further(problem, &result.after.parameters),
             correct: corrections(&problem.session.machine, &result.after.parameters, &result.after.covariance),
+            changed: Vec::new(),
             measure,
         }
     }
@@ -101,7 +103,8 @@ impl Statements<ValidationStatement, MovedParameter> {
         let ValidationResult { verdict, readings, readings_in_range, .. } = *result;
         Statements {
             good: ValidationStatement { verdict, readings, readings_in_range },
-            correct: result.moved.clone(),
+            correct: Vec::new(),
+            changed: result.moved.clone(),
             further: Vec::new(),
             measure: step.into(),
         }
@@ -135,9 +138,11 @@ fn is_exhausted(problem: &Problem, unobservable: &[Unobservable]) -> bool {
 }
 
 /// The step that has to come before any further test.
-fn base_step(plausibility: &Plausibility, goodness: GoodnessVerdict) -> Option<NextStep> {
-    match goodness {
+fn base_step(plausibility: &Plausibility, goodness: Goodness) -> Option<NextStep> {
+    match goodness.verdict {
         _ if !plausibility.conflicts.is_empty() => Some(NextStep::CorrectSession),
+        // More readings are what is lacking.
+        GoodnessVerdict::NotJudged if goodness.not_judged == Some(NotJudged::NoDegreesOfFreedom) => None,
         GoodnessVerdict::NotJudged => Some(NextStep::StateNoise),
         verdict if verdict.lacks_an_effect() => Some(NextStep::Trace),
         _ => None,

@@ -67,6 +67,7 @@ impl PlanAnalysis {
                 worst: worst.map(|error| error.id.clone()),
             },
             correct: worst.map_or(Vec::new(), limiting),
+            changed: Vec::new(),
             further: Vec::new(),
             measure: attainable_of(step, || Ok(problem.clone())).into(),
         }

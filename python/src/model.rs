@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use abbe::apply::compare::workspace::rms_of_moved;
 use abbe::apply::correction::Correction;
 use abbe::apply::export::travel::Travel;
 use abbe::document::{Document, Origin, StatedValidation};
@@ -130,7 +131,11 @@ impl Model {
     fn validate(&self, py: Python<'_>, session: &Session) -> PyResult<Validation> {
         let state = session.state();
         let (model, own) = (Arc::clone(&self.model), Arc::clone(&state));
-        let validation = work::run(py, None, move |_| Ok(validate(&model, &own.session)?))?;
+        let validation = work::run(py, None, move |_| {
+            let mut validation = validate(&model, &own.session)?;
+            validation.result.volumetric_rms_um = rms_of_moved(&model, &validation.result.moved)?;
+            Ok(validation)
+        })?;
         let mut origin = state.origin.clone();
         origin.add(self.origin.clone());
         Ok(Validation { state, origin, validation })

@@ -42,7 +42,7 @@ def test_print_and_notebook_show_the_report(results):
         for words in ("What to correct: ", "What to measure next: "):
             assert words in text and words in page, words
         # `further` only where there is more than lines of axes to correct.
-        assert set(result.statements.to_dict()) - {"further"} == {"good", "correct", "measure"}
+        assert set(result.statements.to_dict()) - {"further", "changed"} == {"good", "correct", "measure"}
         assert "<script" not in page and "<svg" not in page
         for words in ("worst determined", "Goodness of fit", "indistinguishable", "inside the range"):
             assert (words in text) == (words in page), words

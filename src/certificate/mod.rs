@@ -342,7 +342,7 @@ impl<'c> Stated<'c> {
     /// determined.
     pub fn xml(&self, problem: &Problem, result: &FitResult) -> Result<String, IdentifyError> {
         let refused = |why| Err(IdentifyError::NoCertificate { why });
-        if let Some(why) = result.outcome.goodness.verdict.forbids_decisions() {
+        if let Some(why) = result.outcome.goodness.forbids_decisions() {
             return refused(why);
         }
         if !result.plausibility.conflicts.is_empty() {

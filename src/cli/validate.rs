@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use abbe::apply::compare::workspace::rms_of_moved;
 use abbe::document::StatedValidation;
 use abbe::files;
 use abbe::identify::model_file;
@@ -40,7 +41,8 @@ pub fn run(arguments: &ValidateArguments) -> Result<(), Failure> {
     let source = files::text(&arguments.model, "the model file")?;
     let model = model_file::of_source(&source)?;
     let (session, sources) = read_session(&arguments.session, &outputs)?;
-    let validation = validate_anew(&model, &session, &arguments.anew)?;
+    let mut validation = validate_anew(&model, &session, &arguments.anew)?;
+    validation.result.volumetric_rms_um = rms_of_moved(&model, &validation.result.moved)?;
     let mut read = Read::session(&session, &sources, common.seed);
     read.files.extend(&source.stamp);
     let stated = StatedValidation::of_validation(&validation.result);

@@ -6,6 +6,7 @@ use abbe_apply::history::events::{Compensation, Kind};
 use abbe_apply::history::faults::{Fault, FoundEffect, faults};
 use abbe_apply::history::results::{Estimate, History, MachineHistory};
 use abbe_apply::history::{HistoryOptions, MachineSessions, SessionValues, analyse};
+use abbe_identify::results::validation::ValidationVerdict;
 use abbe_identify::results::{NextStep, Statements};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -35,7 +36,7 @@ pub struct FleetHistory {
 pub struct HistoryStatement {
     /// Number of machines.
     pub machines: usize,
-    /// The machines with a parameter that is out of control in the latest session.
+    /// The machines with a parameter that is out of control in the latest session, or whose model does not hold there.
     pub out_of_control: Vec<String>,
 }
 
@@ -49,6 +50,9 @@ pub struct ChangedInHistory {
     /// Its drift, in `unit` a year; absent if it has shifted only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drift_per_year: Option<Estimate>,
+    /// Its last step, in `unit`; absent if it drifts only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shift: Option<Estimate>,
     /// Unit of the parameter.
     pub unit: String,
 }
@@ -58,7 +62,7 @@ pub type HistoryStatements = Statements<HistoryStatement, ChangedInHistory>;
 
 /// Are these machines in control, what to correct, what to measure next.
 pub fn statements(machines: &[MachineHistory]) -> HistoryStatements {
-    let out = machines.iter().filter(|machine| !machine.out_of_control.is_empty());
+    let out = machines.iter().filter(|machine| !machine.out_of_control.is_empty() || machine.validation.is_some());
     let changed = |machine: &MachineHistory| -> Vec<ChangedInHistory> {
         let shifts = machine.changes.iter().filter(|change| match change.kind {
             Kind::Shift | Kind::CompensationAndShift => true,
@@ -71,6 +75,11 @@ pub fn statements(machines: &[MachineHistory]) -> HistoryStatements {
             machine_id: machine.machine_id.clone(),
             id: one.id.clone(),
             drift_per_year: one.drift_per_year,
+            shift: one
+                .steps
+                .last()
+                .filter(|_| shifted.contains(&one.id))
+                .map(|step| Estimate { value: step.value, u: step.u }),
             unit: one.unit.clone(),
         })
         .collect()
@@ -82,6 +91,7 @@ pub fn statements(machines: &[MachineHistory]) -> HistoryStatements {
             out_of_control: out.map(|machine| machine.machine_id.clone()).collect(),
         },
         correct: machines.iter().flat_map(changed).collect(),
+        changed: Vec::new(),
         further: Vec::new(),
         measure: step.into(),
     }
@@ -306,13 +316,20 @@ fn is_of_machine(id: &str) -> bool {
 }
 
 fn machine_sessions(machine_id: String, sessions: &[Dated]) -> MachineSessions {
+    let last = sessions.last().map(|dated| &dated.record);
+    let base = last.and_then(|record| record.base.as_ref());
+    // Base parameters are the same numbers in all sessions only if the same ones are held.
+    let held = |record: &Record| record.base.as_ref().map(|base| base.held.clone());
+    let by_base =
+        base.is_some() && sessions.iter().all(|dated| held(&dated.record) == base.map(|base| base.held.clone()));
     let mut parameters: Vec<(String, String, String)> = Vec::new();
     let mut place: HashMap<String, usize> = HashMap::new();
-    for parameter in sessions.iter().flat_map(|dated| &dated.record.parameters) {
-        if parameter.identifiable && is_of_machine(&parameter.id) && !place.contains_key(&parameter.id) {
-            place.insert(parameter.id.clone(), parameters.len());
-            let text = |text: &Option<String>| text.clone().unwrap_or_default();
-            parameters.push((parameter.id.clone(), text(&parameter.unit), text(&parameter.meaning)));
+    for dated in sessions {
+        for (id, unit, meaning, ..) in dated.record.followed(by_base).values {
+            if is_of_machine(id) && !place.contains_key(id) {
+                place.insert(id.to_string(), parameters.len());
+                parameters.push((id.to_string(), unit.to_string(), meaning.to_string()));
+            }
         }
     }
     let count = parameters.len();
@@ -320,17 +337,14 @@ fn machine_sessions(machine_id: String, sessions: &[Dated]) -> MachineSessions {
         let record = &dated.record;
         let mut values = vec![None; count];
         let mut covariance = vec![vec![0.0; count]; count];
-        let known: Vec<(usize, usize)> = record
-            .parameters
-            .iter()
-            .enumerate()
-            .filter(|(_, parameter)| parameter.identifiable)
-            .filter_map(|(own, parameter)| Some((own, *place.get(&parameter.id)?)))
-            .collect();
+        let followed = record.followed(by_base);
+        let known: Vec<(usize, usize)> =
+            (followed.values.iter().enumerate()).filter_map(|(own, (id, ..))| Some((own, *place.get(*id)?))).collect();
         for (own, at) in &known {
-            values[*at] = record.parameters[*own].value.zip(record.parameters[*own].u);
+            let (.., value, u) = followed.values[*own];
+            values[*at] = Some((value, u));
             for (other, across) in &known {
-                covariance[*at][*across] = record.covariance_of(*own, *other).unwrap_or(0.0);
+                covariance[*at][*across] = followed.covariance_of(*own, *other);
             }
         }
         SessionValues {
@@ -344,7 +358,22 @@ fn machine_sessions(machine_id: String, sessions: &[Dated]) -> MachineSessions {
     let values = values.collect();
     let machine = sessions.last().and_then(|dated| dated.record.machine.clone());
     let (name, code) = machine.map_or((String::new(), String::new()), |machine| (machine.name, machine.code));
-    MachineSessions { machine_id, name, code, parameters, sessions: values }
+    let determined = last.map_or(0, |record| match &record.base {
+        Some(base) => base.parameters.len(),
+        None => record.followed(false).values.iter().filter(|(id, ..)| is_of_machine(id)).count(),
+    });
+    let validation = last.and_then(|record| record.validation.as_ref()).map(|validation| validation.verdict);
+    MachineSessions {
+        machine_id,
+        name,
+        code,
+        parameters,
+        held_at_nominal: base.filter(|_| by_base).map_or_else(Vec::new, |base| base.held.clone()),
+        determined,
+        validation: validation
+            .filter(|verdict| !matches!(verdict, ValidationVerdict::Holds | ValidationVerdict::HoldsInRange)),
+        sessions: values,
+    }
 }
 
 fn found_effects(dated: &Dated) -> impl Iterator<Item = FoundEffect> {

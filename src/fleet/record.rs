@@ -2,7 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use abbe_identify::IdentifyError;
+use abbe_identify::fit::Fit;
+use abbe_identify::fit::base::{Gauge, base_parameters};
 use abbe_identify::noise::NoiseSource;
+use abbe_identify::parameter_description::parameter_meaning;
+use abbe_identify::parameters::Role;
+use abbe_identify::problem::Problem;
 use abbe_identify::results::validation::ValidationVerdict;
 use abbe_identify::results::{
     Covariance, DeterminedBy, EffectName, GoodnessVerdict, ParameterResult, TraceVerdict, Unobservable,
@@ -74,6 +80,9 @@ pub struct Record {
     pub parameters: Vec<ParameterRecord>,
     /// Covariance of the identifiable parameters: the lower triangle, row by row.
     pub covariance: Vec<f64>,
+    /// The base parameters of the machine, if the readings do not separate all of its parameters; `null` otherwise.
+    #[serde(default)]
+    pub base: Option<BaseRecord>,
     /// The effects that the trace found.
     pub effects: Vec<EffectRecord>,
     /// The decisions by the limits of the session; `null` without limits.
@@ -137,6 +146,73 @@ pub struct ParameterRecord {
     pub quotable: bool,
 }
 
+/// Base parameters of the machine: all that the readings determine of it, with other parameters held at nominal.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct BaseRecord {
+    /// The parameters that are held at nominal.
+    pub held: Vec<String>,
+    /// The base parameters.
+    pub parameters: Vec<BaseParameterRecord>,
+    /// Their covariance: the lower triangle, row by row.
+    pub covariance: Vec<f64>,
+}
+
+/// A base parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct BaseParameterRecord {
+    /// Identifier.
+    pub id: String,
+    /// Estimate, in `unit`.
+    pub value: f64,
+    /// Standard uncertainty, in `unit`.
+    pub u: f64,
+    /// Unit of `value` and `u`.
+    pub unit: String,
+    /// What the parameter is, in words.
+    pub meaning: String,
+}
+
+impl BaseRecord {
+    /// Of a fit; `None` if it separates all parameters, or its null space has no stable parametrisation.
+    ///
+    /// # Errors
+    /// If the model cannot be evaluated.
+    pub fn of(problem: &Problem, fit: &Fit) -> Result<Option<BaseRecord>, IdentifyError> {
+        if fit.rank.null_space.ncols() == 0 {
+            return Ok(None);
+        }
+        let base = match base_parameters(problem, fit, Gauge::OwnDirection) {
+            Ok(base) => base,
+            Err(IdentifyError::NotApplicable { .. }) => return Ok(None),
+            Err(error) => return Err(error),
+        };
+        let list = &problem.parameters.list;
+        let display = |j: usize| list[j].unit.display_per_internal;
+        let of_machine = |j: &usize| list[*j].role != Role::Setup;
+        let kept: Vec<usize> = (0..list.len()).filter(|j| !base.held.contains(j)).filter(of_machine).collect();
+        let covariance = |i: usize, j: usize| base.covariance[(i, j)] * display(i) * display(j);
+        let parameters = kept.iter().map(|j| BaseParameterRecord {
+            id: list[*j].id.clone(),
+            value: problem.parameters.value(*j, &base.beta) * display(*j),
+            u: covariance(*j, *j).max(0.0).sqrt(),
+            unit: list[*j].unit.name.clone(),
+            meaning: parameter_meaning(problem, *j, None),
+        });
+        let rows = kept.iter().enumerate();
+        Ok(Some(BaseRecord {
+            held: base.held.iter().filter(|j| of_machine(j)).map(|j| list[*j].id.clone()).collect(),
+            parameters: parameters.collect(),
+            covariance: rows.flat_map(|(row, i)| kept[..=row].iter().map(|j| covariance(*i, *j))).collect(),
+        }))
+    }
+}
+
+/// Position of an entry in a lower triangle that is stored row by row.
+fn in_triangle(a: usize, b: usize) -> usize {
+    let (low, high) = (a.min(b), a.max(b));
+    high * (high + 1) / 2 + low
+}
+
 /// A found effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EffectRecord {
@@ -164,6 +240,22 @@ pub struct EffectRecord {
     pub unique: bool,
     /// Identifiers of the effects that explain the readings equally well, nearest first.
     pub aliases: Vec<String>,
+}
+
+/// The parameters of a session that a history follows.
+pub struct Followed<'r> {
+    /// Identifier, unit, meaning, value and standard uncertainty.
+    pub values: Vec<(&'r str, &'r str, &'r str, f64, f64)>,
+    /// The place of each in the covariance.
+    places: Vec<usize>,
+    covariance: &'r [f64],
+}
+
+impl Followed<'_> {
+    /// Covariance of two of them by their positions in `values`.
+    pub fn covariance_of(&self, a: usize, b: usize) -> f64 {
+        self.covariance.get(in_triangle(self.places[a], self.places[b])).copied().unwrap_or(0.0)
+    }
 }
 
 /// The validation of the machine's model on the session.
@@ -243,9 +335,39 @@ impl Record {
         self.covariance = lower.copied().collect();
     }
 
-    /// Covariance of two identifiable parameters by their positions in `parameters`.
-    pub fn covariance_of(&self, a: usize, b: usize) -> Option<f64> {
-        let (low, high) = (a.min(b), a.max(b));
-        self.covariance.get(high * (high + 1) / 2 + low).copied()
+    /// The parameters of the machine with their values, and those held at nominal: the base parameters if the readings do
+    /// not separate all, else the identifiable ones.
+    pub fn followed(&self, by_base: bool) -> Followed<'_> {
+        match self.base.as_ref().filter(|_| by_base) {
+            Some(base) => Followed {
+                values: base
+                    .parameters
+                    .iter()
+                    .map(|own| (&*own.id, &*own.unit, &*own.meaning, own.value, own.u))
+                    .collect(),
+                places: (0..base.parameters.len()).collect(),
+                covariance: &base.covariance,
+            },
+            None => {
+                let known = self.parameters.iter().enumerate().filter(|(_, own)| own.identifiable);
+                let known: Vec<(usize, &ParameterRecord)> = known.filter(|(_, own)| own.value.is_some()).collect();
+                let value = |own: &ParameterRecord| own.value.zip(own.u).unwrap_or_default();
+                Followed {
+                    values: (known.iter())
+                        .map(|(_, own)| {
+                            (
+                                &*own.id,
+                                own.unit.as_deref().unwrap_or_default(),
+                                own.meaning.as_deref().unwrap_or_default(),
+                                value(own).0,
+                                value(own).1,
+                            )
+                        })
+                        .collect(),
+                    places: known.iter().map(|(place, _)| *place).collect(),
+                    covariance: &self.covariance,
+                }
+            }
+        }
     }
 }

@@ -20,7 +20,9 @@ use abbe_trace::{Progress, TraceOptions, trace};
 use sha2::{Digest, Sha256};
 
 use super::options::Options;
-use super::record::{EffectRecord, ErrorRecord, InputRecord, MachineRecord, Record, SCHEMA_VERSION, ValidationRecord};
+use super::record::{
+    BaseRecord, EffectRecord, ErrorRecord, InputRecord, MachineRecord, Record, SCHEMA_VERSION, ValidationRecord,
+};
 use super::store::{IfClaimed, Pointer, Search, Store, found_or_claimed};
 use super::{BUILD, FleetError};
 
@@ -249,7 +251,9 @@ fn identify(
     should_continue: &(dyn Fn() -> bool + Sync),
 ) -> Result<(), IdentifyError> {
     if record.options.no_trace {
-        set_fit(record, &SessionFit::of(session, record.seed)?.result);
+        let found = SessionFit::of(session, record.seed)?;
+        set_fit(record, &found.result);
+        record.base = BaseRecord::of(&found.problem, &found.fit)?;
         return Ok(());
     }
     let options = TraceOptions {
@@ -270,6 +274,7 @@ fn identify(
         })
         .collect();
     set_trace(record, &found.result);
+    record.base = BaseRecord::of(&found.after, &found.after_fit)?;
     Ok(())
 }
 

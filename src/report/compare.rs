@@ -1,5 +1,7 @@
 //! Differences between models of one machine.
 
+use std::cmp::Ordering;
+
 use abbe::apply::compare::results::{Comparison, Difference, Pair};
 use abbe::document::StatedComparison;
 use abbe::identify::results::Outlier;
@@ -8,7 +10,7 @@ use abbe::model::words::counted;
 use super::block::{Report, Text};
 use super::figure::bars::{Row, Value, Values};
 use super::figure::{Chart, Figure, Quantity};
-use super::number::{p_equals, probability, quantity, unit, units, value_and_u};
+use super::number::{fixed, p_equals, probability, quantity, unit, units, value_and_u};
 use super::statements;
 use super::table::{Cell, Table, cells, numbers};
 
@@ -29,8 +31,8 @@ pub fn report(machine: &str, stated: &StatedComparison<'_>, with_workspace: bool
     let mut report = Report::new(format!("Comparison of models of {machine}"));
     report.method = METHOD.to_string();
     report.values = values(comparison);
-    let statements = statements::of_comparison(&stated.statements);
-    report.opening("", comparison.pairs.iter().map(|pair| sentence(comparison, pair)).chain(statements));
+    let pairs = comparison.pairs.iter().enumerate().map(|(number, pair)| sentence(comparison, number, pair).into());
+    report.opening("", pairs.chain(statements::of_comparison(comparison, &stated.statements)));
     for pair in &comparison.pairs {
         report.section(&format!("{} → {}", pair.from, pair.to));
         report.key(Text::List(remarks(comparison, pair)));
@@ -48,14 +50,33 @@ pub fn report(machine: &str, stated: &StatedComparison<'_>, with_workspace: bool
     report
 }
 
-/// What has changed.
-fn sentence(comparison: &Comparison, pair: &Pair) -> String {
+/// How the volumetric error changed, and in how many parameters the machine did.
+fn sentence(comparison: &Comparison, number: usize, pair: &Pair) -> String {
+    let volume = match (comparison.workspace.first(), comparison.workspace.get(number + 1)) {
+        (Some(before), Some(after)) => {
+            format!("{}; ", volumetric(before.rms_um, after.rms_um))
+        }
+        _ => String::new(),
+    };
+    if !pair.judged {
+        return format!("{} → {}: {volume}the differences are not judged.", pair.from, pair.to);
+    }
     let changed = match pair.significant {
         0 => format!("no significant difference in {}", counted(pair.compared, "parameter")),
         count => format!("{} of {}", counted(count, "significant difference"), counted(pair.compared, "parameter")),
     };
     let level = comparison.significance;
-    format!("{} → {}: {changed} (any false claim: probability ≤ {level}).", pair.from, pair.to)
+    format!("{} → {}: {volume}{changed} (any false claim: probability ≤ {level}).", pair.from, pair.to)
+}
+
+/// How the volumetric error changed, in words.
+pub fn volumetric(before_um: f64, after_um: f64) -> String {
+    let [before, after] = [before_um, after_um].map(|um| fixed(um, 2));
+    match before_um.total_cmp(&after_um) {
+        _ if before == after => format!("the volumetric error stays at {after} µm rms"),
+        Ordering::Less => format!("the volumetric error rises from {before} to {after} µm rms"),
+        _ => format!("the volumetric error falls from {before} to {after} µm rms"),
+    }
 }
 
 /// All differences together, and what is not compared.
@@ -113,7 +134,11 @@ fn own<'c>(comparison: &'c Comparison, pair: &'c Pair) -> impl Iterator<Item = &
 
 fn differences(comparison: &Comparison, pair: &Pair) -> Table {
     let rows = own(comparison, pair).map(|d| {
-        let verdict = if d.significant { "significant" } else { "" };
+        let verdict = match pair.judged {
+            true if d.significant => "significant",
+            true => "",
+            false => "not judged",
+        };
         let [value, u] = Cell::estimate(d.value, d.u);
         cells![d.id.clone(), value, u, unit(&d.unit), probability(d.p_value), verdict]
     });

@@ -241,6 +241,12 @@ impl Figures {
         self.0.rows.push(cells![section, id, meaning, Cell::exact(value), "", unit]);
     }
 
+    /// An estimate with its uncertainty, if there is one.
+    pub fn estimate(&mut self, section: &str, id: &str, meaning: &str, found: Option<(f64, f64)>, unit: &str) {
+        let cells = |(value, u)| cells![section, id, meaning, Cell::exact(value), Cell::exact(u), unit];
+        self.0.rows.extend(found.map(cells));
+    }
+
     /// Parameters with their uncertainties.
     pub fn parameters(&mut self, section: &str, parameters: &[ParameterResult]) {
         self.0.rows.extend(

@@ -1,7 +1,7 @@
 //! The machines of a fleet over time.
 
 use abbe::apply::history::chart::{EWMA_LIMIT, SHEWHART_LIMIT};
-use abbe::apply::history::events::Kind;
+use abbe::apply::history::events::{ChangeEvent, Kind, ParameterChange};
 use abbe::apply::history::results::{Due, Estimate, MachineHistory, ParameterHistory};
 use abbe::document::StatedHistory;
 use abbe::fleet::conformity::{ItemHistory, MachineConformity};
@@ -10,12 +10,12 @@ use abbe::identify::tolerance::rule::Decision;
 use abbe::model::calendar::date;
 use abbe::model::words::{counted, first_of};
 
-use super::block::{KeyFigure, Report};
+use super::block::{KeyFigure, Report, Text};
 use super::conformity::limits;
 use super::figure::lines::{Axis, Lines, Mark, Series};
 use super::figure::scale::{Scale, span};
 use super::figure::{Chart, Figure};
-use super::number::unit;
+use super::number::{quantity, unit, value_and_u};
 use super::statements;
 use super::table::{Cell, Table, cells, numbers, words};
 
@@ -52,6 +52,7 @@ pub fn fleet(stated: &StatedHistory<'_>) -> Report {
         KeyFigure::new("Changes", changes.rows.len().to_string(), ""),
     ]);
     section(&mut report, "Machines", machines(found), "No machine has a dated session.");
+    report.key(Text::List(followed(all)));
     section(&mut report, "Drifts", drifts, "No parameter drifts significantly.");
     section(&mut report, "Changes", changes, "No parameter has a significant step.");
     report.section("Conformity (rule of ISO 14253-1, limits of each session)");
@@ -81,6 +82,7 @@ pub fn machine(machine: &MachineHistory, statements: &HistoryStatements, conform
         ),
         KeyFigure::new("Next check", next_check(machine), machine.due_parameter.clone().unwrap_or_default()),
     ]);
+    report.key(Text::List(followed(own)));
     section(&mut report, "Drifts", drifts(own), "No parameter drifts significantly.");
     section(&mut report, "Changes", changes(own), "No parameter has a significant step.");
     if let Some(own) = conformity.iter().find(|own| own.machine_id == machine.machine_id) {
@@ -237,11 +239,38 @@ fn changes(machines: &[MachineHistory]) -> Table {
                 date(change.before_days),
                 kind(change.kind),
                 Cell::fixed(change.direction_cosine, 2),
-                change.parameters.join(", ")
+                amounts(change)
             ]
         })
     });
     Table::new(["machine", "after", "before", "change", ">cosine", "parameters"], rows.collect::<Vec<_>>())
+}
+
+/// The parameters that have a step, each with its change.
+fn amounts(change: &ChangeEvent) -> String {
+    let found = change.changes.iter().filter(|own| change.parameters.contains(&own.id));
+    let amount = |own: &ParameterChange| {
+        let (value, u) = value_and_u(own.value, own.u);
+        format!("{} {}", own.id, quantity(&format!("{value} ± {u}"), &own.unit))
+    };
+    found.map(amount).collect::<Vec<_>>().join(", ")
+}
+
+/// How much of what the sessions determine is followed, of machines whose parameters are not all separable.
+fn followed(machines: &[MachineHistory]) -> Vec<String> {
+    let incomplete = machines.iter().filter(|own| own.followed < own.determined || !own.held_at_nominal.is_empty());
+    let sentence = |own: &MachineHistory| {
+        let held = match own.held_at_nominal.len() {
+            0 => String::new(),
+            count => format!(" (base parameters; {} held at nominal)", counted(count, "parameter")),
+        };
+        let Some(share) = (100 * own.followed).checked_div(own.determined) else { return own.machine_id.clone() };
+        format!(
+            "{}: {} of {} determined parameters are followed, {share} %{held}",
+            own.machine_id, own.followed, own.determined
+        )
+    };
+    incomplete.map(sentence).collect()
 }
 
 /// The decisions of conformity of all machines: the latest one of each quantity, those that fail first.

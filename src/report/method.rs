@@ -8,6 +8,7 @@ use abbe::model::words::counted;
 use super::block::Report;
 use super::figure::bars::{Row, Value, Values};
 use super::figure::{Chart, Figure, Quantity};
+use super::fit::Figures;
 use super::number::{micrometres, unit, units};
 use super::quality::noise;
 use super::quality::noise_sentence;
@@ -25,16 +26,23 @@ pub fn report(problem: &Problem, result: &Comparison) -> Report {
         result.method,
         noise_sentence(result.noise_um, ReadingUnit::Micrometre, result.noise_source)
     );
-    report.opening("", [
-        format!(
-            "The {} method reduces the rms residual of its tests from {} to {}. The rms residual of the full fit in all tests is {}.",
-            result.method,
-            micrometres(result.nominal_rms_um),
-            micrometres(result.method_rms_um),
-            micrometres(result.rms_um)
-        ),
-        format!("{}, {}.", counted(result.readings, "reading"), noise(result.noise_um, ReadingUnit::Micrometre, result.noise_source)),
-    ]);
+    report.values = values(result);
+    report.opening(
+        "",
+        [
+            format!(
+                "The {} method {}. The rms residual of the full fit in all tests is {}.",
+                result.method,
+                change(result),
+                micrometres(result.rms_um)
+            ),
+            format!(
+                "{}, {}.",
+                counted(result.readings, "reading"),
+                noise(result.noise_um, ReadingUnit::Micrometre, result.noise_source)
+            ),
+        ],
+    );
     report.section("Errors by both methods");
     report.key(errors(result));
     report.figures(figures(result));
@@ -42,6 +50,43 @@ pub fn report(problem: &Problem, result: &Comparison) -> Report {
     report.key(centres(result));
     session::machine(&mut report, problem);
     report
+}
+
+/// What the method makes of the rms residual of its tests.
+fn change(result: &Comparison) -> String {
+    let [nominal, own] = [result.nominal_rms_um, result.method_rms_um].map(micrometres);
+    match result.method_rms_um < result.nominal_rms_um {
+        true => format!("reduces the rms residual of its tests from {nominal} to {own}"),
+        false => format!(
+            "does not reduce the rms residual of its tests: {nominal} of the nominal machine, {own} with its errors"
+        ),
+    }
+}
+
+/// Every figure with all its digits, one row each.
+fn values(result: &Comparison) -> Table {
+    let mut figures = Figures::default();
+    for (id, rms_um) in
+        [("nominal", result.nominal_rms_um), ("method", result.method_rms_um), ("full fit", result.rms_um)]
+    {
+        figures.figure("residual", id, "rms", rms_um, "um");
+    }
+    for row in &result.errors {
+        figures.estimate("method", &row.id, "", row.value.zip(row.u), &row.unit);
+        figures.estimate("full fit", &row.id, "", row.full_value.zip(row.full_u), &row.unit);
+        for (section, bias) in [("bias of the method", row.bias), ("bias of the full fit", row.full_bias)] {
+            bias.into_iter().for_each(|bias| figures.figure(section, &row.id, "", bias, &row.unit));
+        }
+    }
+    for centre in &result.centres {
+        for found in &centre.offsets {
+            let id = format!("{} of {} in {}", found.direction, centre.axis, centre.test);
+            figures.estimate("offset", &id, "", Some((found.offset_um, found.u_um)), "um");
+        }
+        figures.figure("radius", &centre.test, "", centre.radius_mm, "mm");
+        figures.figure("cone height", &centre.test, "", centre.height_mm, "mm");
+    }
+    figures.table()
 }
 
 fn figures(result: &Comparison) -> Vec<Figure> {

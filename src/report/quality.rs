@@ -2,7 +2,7 @@
 
 use abbe::identify::noise::NoiseSource;
 use abbe::identify::problem::Problem;
-use abbe::identify::results::{CrossValidation, Goodness, GoodnessVerdict, OfAngles};
+use abbe::identify::results::{CrossValidation, Goodness, GoodnessVerdict, NotJudged, OfAngles};
 use abbe::identify::unit::ReadingUnit;
 use abbe::model::words::counted;
 
@@ -167,18 +167,27 @@ pub fn noise_sentence(noise_um: f64, unit: ReadingUnit, source: NoiseSource) -> 
 pub fn agreement(goodness: Goodness, degrees_of_freedom: usize) -> String {
     let figures = format!("χ²/ν = {:.2}, ν = {degrees_of_freedom}", goodness.chi_square_ratio);
     match goodness.verdict {
-        GoodnessVerdict::NotJudged => {
-            "cannot be judged: no noise is stated or follows from repeats, so the residual is taken for noise"
-                .to_string()
-        }
+        GoodnessVerdict::NotJudged => match goodness.not_judged {
+            Some(NotJudged::BelowNoise) => {
+                format!("not judged: the residual is far below the noise ({figures}), so the noise is overstated")
+            }
+            Some(NotJudged::WrongUnit) => {
+                "not judged: the residual is less than a tenth of the noise; the unit of the readings is the likely cause"
+                    .to_string()
+            }
+            Some(NotJudged::NoDegreesOfFreedom) => {
+                "not judged: no degrees of freedom, the parameters are as many as the readings".to_string()
+            }
+            Some(NotJudged::NoNoise) | None => {
+                "cannot be judged: no noise is stated or follows from repeats, so the residual is taken for noise"
+                    .to_string()
+            }
+        },
         GoodnessVerdict::Exceeds => format!("the residual exceeds the noise ({figures}): the model lacks an effect"),
         GoodnessVerdict::Structured => {
             format!(
                 "the residual is no larger than the noise ({figures}), but it has structure: the model lacks an effect"
             )
-        }
-        GoodnessVerdict::NoiseOverstated => {
-            format!("the residual is smaller than the noise ({figures}): the noise is overstated")
         }
         GoodnessVerdict::Agrees => format!("the residual agrees with the noise ({figures})"),
     }
@@ -186,7 +195,10 @@ pub fn agreement(goodness: Goodness, degrees_of_freedom: usize) -> String {
 
 /// What the estimates of a model are not good for; `None` if they may be quoted.
 pub fn reservation(goodness: Goodness) -> Option<&'static str> {
-    (!goodness.quotable).then_some(
-        "not to be quoted: the model lacks an effect, and u does not cover the bias that it causes in the estimates",
-    )
+    (!goodness.quotable).then_some(match goodness.not_judged {
+        Some(NotJudged::WrongUnit) => {
+            "not to be quoted: the residual is less than a tenth of the noise, so that the unit of the readings is in doubt"
+        }
+        _ => "not to be quoted: the model lacks an effect, and u does not cover the bias that it causes in the estimates",
+    })
 }

@@ -7,6 +7,7 @@ use abbe::model::session::Session;
 use abbe::model::words::counted;
 
 use super::block::{Report, Text};
+use super::fit::Figures;
 use super::number::{fixed, micrometres, places, value_and_u};
 use super::quality::noise;
 use super::table::{Cell, Table, cells, numbers, words};
@@ -19,6 +20,7 @@ pub fn report(session: &Session, result: &SelfCalibration) -> Report {
     report.method = "Rotary axis, linear axes and artefact are estimated separately, under the conditions stated \
                      (Zimmermann and Ibaraki 2020)."
         .to_string();
+    report.values = values(result);
     report.opening(
         "",
         [
@@ -66,6 +68,35 @@ pub fn report(session: &Session, result: &SelfCalibration) -> Report {
         )));
     }
     report
+}
+
+/// Every figure with all its digits, one row each; the meaning of a point of a function is its angle in degrees.
+fn values(result: &SelfCalibration) -> Table {
+    let mut figures = Figures::default();
+    figures.figure("noise", result.noise_source.word(), "", result.noise_um, "um");
+    figures.figure("residual", "rms", "", result.rms_um, "um");
+    for (section, functions) in [("function", &result.functions), ("error motion", &result.error_motions)] {
+        for function in functions {
+            for point in &function.points {
+                let found = point.value_um.zip(point.u_um);
+                figures.estimate(section, &function.id, &point.at_deg.to_string(), found, "um");
+            }
+        }
+    }
+    figures.parameters("radius", result.radius.as_slice());
+    figures.parameters("axis, by the circle", &result.parameters);
+    figures.parameters("axis, by the rotation", &result.parameters_by_turn);
+    for quantity in result.monte_carlo.iter().flat_map(|drawn| &drawn.quantities) {
+        figures.estimate("Monte Carlo", &quantity.id, "", Some((quantity.mean_um, quantity.u_um)), "um");
+        for (name, interval) in [
+            ("shortest interval", quantity.shortest_interval_um),
+            ("symmetric interval", quantity.symmetric_interval_um),
+        ] {
+            figures.figure(name, &quantity.id, "low", interval.low, "um");
+            figures.figure(name, &quantity.id, "high", interval.high, "um");
+        }
+    }
+    figures.table()
 }
 
 /// Functions side by side, one row per angle.

@@ -1,15 +1,16 @@
 //! The three statements that open a report: is it good, what to correct, what to measure next.
 
+use std::path::Path;
+
 use abbe::apply::compare::ComparisonStatement;
-use abbe::apply::compare::results::Difference;
+use abbe::apply::compare::results::{Comparison, Difference};
 use abbe::codegen::nc::{self, has_letters};
 #[cfg(feature = "fleet")]
 use abbe::fleet::history::HistoryStatements;
-use abbe::identify::results::validation::MovedParameter;
-use abbe::identify::results::validation::ValidationVerdict;
+use abbe::identify::results::validation::{MovedParameter, ValidationResult, ValidationVerdict};
 use abbe::identify::results::{
-    AxisCorrection, DeterminedBy, GoodStatement, LineQuantity, MeasureStatement, NextStep, ParameterResult, Statements,
-    ValidationStatement,
+    AxisCorrection, DeterminedBy, GoodStatement, LineQuantity, MeasureStatement, NextStep, NotJudged, ParameterResult,
+    Statements, ValidationStatement,
 };
 use abbe::identify::tolerance::rule::Decision;
 use abbe::model::chain::Machine;
@@ -20,8 +21,10 @@ use abbe::plan::results::{Contribution, ErrorAnalysis, PlanAnalysis};
 
 use super::block::Sentence;
 use super::commands::{Commands, MEASURE, NEXT, PROGRAMS};
+use super::compare::volumetric;
 use super::number::{fixed, places, quantity, three_digits, value_and_u};
 use super::parameters::PRIOR;
+use super::provenance::quoted;
 use super::quality::agreement;
 use super::table::{Cell, Table, cells};
 
@@ -33,6 +36,8 @@ pub const IDENTIFIES: &str = "makes the confounded parameters identifiable";
 pub const IMPROVES: &str = "most lowers the largest uncertainty";
 /// Share of the noise in a variance below which more readings do not help.
 const MIN_NOISE_SHARE: f64 = 0.1;
+/// The session that the trace of an input of a comparison writes, beside the input.
+const TRACED: &str = "traced.toml";
 /// Digits of a component of a unit vector.
 const DIRECTION_PLACES: usize = 6;
 
@@ -47,7 +52,10 @@ pub fn opening(
     let mut sentences = vec![good.into(), correct(statements).into()];
     if statements.measure.step == NextStep::StateNoise {
         let keys = session.keys_of_noise();
-        let what = format!("a run once more, or state {keys}: only then can the model be judged");
+        let what = match statements.good.goodness.not_judged {
+            Some(NotJudged::BelowNoise) => format!("nothing before {keys} is that of the instrument"),
+            _ => format!("a run once more, or state {keys}: only then can the model be judged"),
+        };
         sentences.push(format!("What to measure next: {what}").into());
     } else {
         sentences.extend(measure(&statements.measure, Some(&session.machine), commands));
@@ -72,7 +80,10 @@ fn correct(statements: &Statements) -> String {
     let ratio = |change: &AxisCorrection| (change.change / change.u).abs();
     large.sort_by(|a, b| ratio(b).total_cmp(&ratio(a)));
     if !statements.good.goodness.quotable {
-        return "What to correct: nothing yet; the effect that the model lacks biases the estimates".to_string();
+        return match statements.good.goodness.not_judged {
+            Some(_) => "What to correct: nothing yet; the unit of the readings is in doubt".to_string(),
+            None => "What to correct: nothing yet; the effect that the model lacks biases the estimates".to_string(),
+        };
     }
     let further = || {
         let mut further: Vec<&ParameterResult> = statements.further.iter().collect();
@@ -83,6 +94,10 @@ fn correct(statements: &Statements) -> String {
     if large.is_empty() && statements.further.is_empty() {
         return match statements.correct.is_empty() {
             true => "What to correct: no location error is determined alone, only combinations of them".to_string(),
+            false if statements.good.goodness.not_judged == Some(NotJudged::BelowNoise) => {
+                "What to correct: not judged; no axis deviates by more than an uncertainty that is overstated"
+                    .to_string()
+            }
             false => "What to correct: nothing; no axis deviates by more than the uncertainty".to_string(),
         };
     }
@@ -230,26 +245,34 @@ fn percent(share: f64) -> String {
     if percent > 0.0 && percent < 1.0 { "< 1 %".to_string() } else { format!("{percent:.0} %") }
 }
 
-/// What to correct and to measure after a validation.
+/// What has changed, what to correct and to measure after a validation.
 pub fn of_validation(
     statements: &Statements<ValidationStatement, MovedParameter>,
-    outside: &[String],
+    result: &ValidationResult,
     commands: &Commands,
 ) -> Vec<Sentence> {
+    let outside = &result.outside;
     let moved = statements
-        .correct
+        .changed
         .iter()
         .map(|moved| format!("{} has moved by {}", moved.id, estimate(moved.value, moved.u, &moved.unit)));
-    let correct = match (statements.correct.is_empty(), statements.good.verdict) {
-        (false, _) => first_of(&moved.collect::<Vec<_>>(), NAMED, ", ", "further parameter"),
-        (true, ValidationVerdict::Holds | ValidationVerdict::HoldsInRange) => {
-            "nothing; no parameter has moved".to_string()
-        }
+    let mut sentences: Vec<Sentence> = Vec::new();
+    if !statements.changed.is_empty() {
+        let volume = match result.volumetric_rms_um[..] {
+            [before, after] => format!("{}; ", volumetric(before, after)),
+            _ => String::new(),
+        };
+        let moved = first_of(&moved.collect::<Vec<_>>(), NAMED, ", ", "further parameter");
+        sentences.push(format!("What has changed: {volume}{moved}").into());
+    }
+    let correct = match (statements.changed.is_empty(), statements.good.verdict) {
+        (false, _) => "by a change alone nothing; a model of these readings states what remains",
+        (true, ValidationVerdict::Holds | ValidationVerdict::HoldsInRange) => "nothing; no parameter has moved",
         (true, ValidationVerdict::Degraded | ValidationVerdict::DoesNotHold) => {
-            "no single parameter; the model lacks what these readings show".to_string()
+            "no single parameter; the model lacks what these readings show"
         }
     };
-    let mut sentences = vec![format!("What to correct: {correct}").into()];
+    sentences.push(format!("What to correct: {correct}").into());
     match statements.measure.step {
         NextStep::WidenRange => sentences.push(
             format!(
@@ -264,20 +287,66 @@ pub fn of_validation(
     sentences
 }
 
-/// What to correct and to measure after a comparison.
-pub fn of_comparison(statements: &Statements<ComparisonStatement, Difference>) -> Vec<String> {
-    let changed = statements.correct.iter().map(|d| format!("{} {}", d.id, estimate(d.value, d.u, &d.unit)));
-    let correct = match statements.correct.is_empty() {
-        true => "nothing; nothing differs significantly".to_string(),
+/// What has changed, what to correct and to measure after a comparison.
+pub fn of_comparison(
+    comparison: &Comparison,
+    statements: &Statements<ComparisonStatement, Difference>,
+) -> Vec<Sentence> {
+    let last = comparison.inputs.last().map_or("", String::as_str);
+    let changed = statements.changed.iter().map(|d| format!("{} {}", d.id, estimate(d.value, d.u, &d.unit)));
+    let single: Vec<String> = (comparison.pairs.iter().filter(|pair| pair.significant > 1))
+        .flat_map(|pair| &pair.single_changes)
+        .map(|one| {
+            format!("{} {} (probability {})", one.id, estimate(one.value, one.u, &one.unit), percent(one.probability))
+        })
+        .collect();
+    let changed = match statements.changed.is_empty() {
+        true => "nothing significant".to_string(),
+        // Several parameters of one gauge may be one change.
+        false if comparison.pairs.len() == 1 && !single.is_empty() => {
+            format!(
+                "one parameter explains all differences: {}",
+                first_of(&single, NAMED, ", or ", "further explanation")
+            )
+        }
         false => first_of(&changed.collect::<Vec<_>>(), NAMED, ", ", "further difference"),
     };
+    let correct = format!("What to correct: by a change alone nothing; the fit of {last} states what remains");
     let next = match statements.measure.step {
         NextStep::Repeat => {
             "the last session once more, mounted anew: it tells a change of the machine from one of the set-up"
         }
+        NextStep::Trace => return before_comparison(comparison),
         _ => "nothing before the next check",
     };
-    vec![format!("What to correct: {correct}"), format!("What to measure next: {next}")]
+    vec![format!("What has changed: {changed}").into(), correct.into(), format!("What to measure next: {next}").into()]
+}
+
+/// What comes before a comparison of inputs of which one lacks an effect.
+fn before_comparison(comparison: &Comparison) -> Vec<Sentence> {
+    let mut sentences: Vec<Sentence> = (comparison.not_judged.iter())
+        .map(|own| {
+            let ratio = three_digits(own.birge_ratio.powi(2));
+            format!("What has changed: not judged; {} (χ²/ν = {ratio}): {}", own.input, own.why).into()
+        })
+        .collect();
+    sentences.push("What to correct: nothing yet; what the model lacks is in every difference".to_string().into());
+    sentences.push(
+        "What to measure next: nothing before a trace, whose session takes the place in the comparison"
+            .to_string()
+            .into(),
+    );
+    for own in &comparison.not_judged {
+        let session = match own.is_session {
+            true => quoted(own.input.clone()),
+            // A model has no readings.
+            false => "SESSION".to_string(),
+        };
+        let written = quoted(Path::new(&own.input).with_file_name(TRACED).display().to_string());
+        let command = format!("abbe trace {session} --write {written}");
+        sentences.push(Sentence::Command(command, format!("finds the effect behind {}", own.input)));
+    }
+    sentences
 }
 
 /// What to correct and to measure by a history; `check`, the machine whose next check is due first, and when.
@@ -289,16 +358,19 @@ pub fn of_history(
 ) -> Vec<String> {
     let out = &statements.good.out_of_control;
     let control = match out.len() {
-        0 => "No machine is out of control".to_string(),
+        0 if statements.correct.is_empty() => "No machine is out of control".to_string(),
+        0 => "Within the limits of the control charts since the last change".to_string(),
         _ => format!("Out of control: {}", first_of(out, NAMED, ", ", "further machine")),
     };
     let several = statements.good.machines > 1;
     let changed = statements.correct.iter().map(|changed| {
         let of = if several { format!(" of {}", changed.machine_id) } else { String::new() };
-        let how = match changed.drift_per_year {
-            Some(drift) => format!("drifts by {} a year", estimate(drift.value, drift.u, &changed.unit)),
-            None => "has shifted".to_string(),
-        };
+        let drift = changed
+            .drift_per_year
+            .map(|drift| format!("drifts by {} a year", estimate(drift.value, drift.u, &changed.unit)));
+        let shift =
+            changed.shift.map(|shift| format!("has shifted by {}", estimate(shift.value, shift.u, &changed.unit)));
+        let how = drift.into_iter().chain(shift).collect::<Vec<_>>().join(" and ");
         format!("{}{of} {how}", changed.id)
     });
     let correct = match statements.correct.is_empty() {

@@ -3,7 +3,7 @@
 use abbe::document::StatedTrace;
 use abbe::identify::IdentifyError;
 use abbe::identify::results::{
-    EffectResult, GoodnessVerdict, ModelResult, NextStep, PriorResult, TraceResult, TraceVerdict,
+    EffectResult, GoodnessVerdict, ModelResult, NextStep, NotJudged, PriorResult, TraceResult, TraceVerdict,
 };
 use abbe::identify::series::{spectrum, views};
 use abbe::model::words::counted;
@@ -140,10 +140,16 @@ fn verdict(result: &TraceResult) -> String {
             format!("{subject} a part of the residual of the declared model: {found}. {}", remains(result))
         }
         TraceVerdict::NotJudged => format!(
-            "{} No noise is stated or follows from repeats, so that whether the remaining residual is noise cannot be judged.",
+            "{} {}, so that whether the remaining residual is noise cannot be judged.",
             match result.effects.len() {
                 0 => "The search finds no effect.".to_string(),
                 _ => format!("{subject} a part of the residual of the declared model: {found}."),
+            },
+            match result.outcome.goodness.not_judged {
+                Some(NotJudged::BelowNoise) => "The residual is far below the noise",
+                Some(NotJudged::WrongUnit) => "The residual is less than a tenth of the stated noise",
+                Some(NotJudged::NoDegreesOfFreedom) => "The parameters are as many as the readings",
+                Some(NotJudged::NoNoise) | None => "No noise is stated or follows from repeats",
             }
         ),
         TraceVerdict::Unexplained => format!("No effect of the library explains the residual. {}", remains(result)),

@@ -37,7 +37,7 @@ pub fn report(
     report.warnings.clone_from(&result.warnings);
     report.method = METHOD.to_string();
     let sentence = format!("{}.", capitalised(&sentence(result)));
-    let statements = statements::of_validation(&stated.statements, &result.outside, commands);
+    let statements = statements::of_validation(&stated.statements, result, commands);
     let readings = format!("{}.", readings(result));
     let sentences = std::iter::once(sentence.into()).chain(statements).chain([readings.into()]);
     report.opening(result.verdict.to_string(), sentences);

@@ -18,9 +18,11 @@ pub fn is_another_session(plausibility: &Plausibility) -> bool {
         ConflictKind::Residual | ConflictKind::Orientations => true,
         ConflictKind::ExplainedVariance => conflict.value < conflict.stated,
         ConflictKind::Statement => conflict.value > STATEMENT_EXPLAINS * conflict.stated,
-        ConflictKind::SetupParameter | ConflictKind::Setups | ConflictKind::LocationError | ConflictKind::ZeroAngle => {
-            false
-        }
+        ConflictKind::SetupParameter
+        | ConflictKind::Setups
+        | ConflictKind::Unit
+        | ConflictKind::LocationError
+        | ConflictKind::ZeroAngle => false,
     })
 }
 

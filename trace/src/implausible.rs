@@ -70,6 +70,19 @@ impl Contradicted {
         is_another_session(&self.plausibility)
     }
 
+    /// The same for a search with the priors of the set-up.
+    pub fn with_priors(self) -> Contradicted {
+        Contradicted { parameters: Vec::new(), ..self }
+    }
+
+    /// The contradictions that remain beside the found effects.
+    pub fn beside(self, found: &TraceOutcome) -> Contradicted {
+        match found.effects.is_empty() || self.plausibility.conflicts.is_empty() {
+            true => self,
+            false => Contradicted { plausibility: plausibility::examine(&found.after, &found.after_fit), ..self },
+        }
+    }
+
     /// Adds the contradictions to a result, before its other warnings.
     pub fn add_warnings(&self, result: &mut TraceResult) {
         let mut warnings = plausibility::warnings(&self.plausibility);

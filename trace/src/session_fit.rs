@@ -7,7 +7,7 @@ use abbe_identify::circular;
 use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::{Fit, prepare, report};
 use abbe_identify::problem::Problem;
-use abbe_identify::results::{FitResult, GoodnessVerdict, ParameterResult};
+use abbe_identify::results::{FitResult, ParameterResult};
 use abbe_identify::tolerance::conformity;
 use abbe_model::session::Session;
 
@@ -33,7 +33,7 @@ impl SessionFit {
     pub fn of(session: &Session, seed: u64) -> Result<SessionFit, IdentifyError> {
         let (problem, fit) = prepare(session, seed)?;
         let mut result = report(&problem, &fit)?;
-        if result.conformity.is_some() && result.outcome.goodness.verdict.forbids_decisions().is_none() {
+        if result.conformity.is_some() && result.outcome.goodness.forbids_decisions().is_none() {
             test_structure(&problem, &fit, &mut result, seed)?;
         }
         Ok(SessionFit { problem, fit, result })
@@ -64,7 +64,7 @@ fn test_structure(problem: &Problem, fit: &Fit, result: &mut FitResult, seed: u6
         &result.parameters,
         &circular::of_session(&problem.session, problem.noise.sigma_mm, &problem.rejected),
         result.noise_um,
-        GoodnessVerdict::Structured,
+        goodness,
     );
     result.warnings.push(format!(
         "the residual has structure that the model does not explain: {}; trace it to find the effect",

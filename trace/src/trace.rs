@@ -127,7 +127,7 @@ pub fn trace(
     progress(Progress::Fitting);
     let mut found = without_conformity(session, options, progress)?;
     let (after, noise_um) = (&found.after, found.result.noise_um);
-    let goodness = found.result.outcome.goodness.verdict;
+    let goodness = found.result.outcome.goodness;
     let circular = circular::of_session(&after.session, after.noise.sigma_mm, &after.rejected);
     found.result.conformity = conformity(&after.session, &found.result.after.parameters, &circular, noise_um, goodness);
     Ok(found)
@@ -153,10 +153,12 @@ fn without_conformity(
         }
         // The effects found without the set-up priors explain the apparent contradiction. The search therefore runs
         // with these priors.
-        return with_noise_of_repeats(problem, fitted, options, progress);
+        let mut found = with_noise_of_repeats(problem, fitted, options, progress)?;
+        contradicted.with_priors().beside(&found).add_warnings(&mut found.result);
+        return Ok(found);
     }
     let mut found = with_noise_of_repeats(problem, fitted, options, progress)?;
-    contradicted.add_warnings(&mut found.result);
+    contradicted.beside(&found).add_warnings(&mut found.result);
     Ok(found)
 }
 

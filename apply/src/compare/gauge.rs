@@ -21,7 +21,7 @@ use abbe_identify::numerics::solve::Svd;
 const SAME_DIRECTION: f64 = 0.05;
 
 /// Brings a difference over the common parameters to the gauge of both models. Returns the held parameters, by index
-/// among the common ones.
+/// among the common ones, and the matrix `T`.
 ///
 /// # Errors
 /// If a null direction is not finite.
@@ -31,20 +31,21 @@ pub(super) fn one_gauge(
     common: &[(usize, usize)],
     delta: &mut [f64],
     covariance: &mut Mat<f64>,
-) -> Result<Vec<usize>, ApplyError> {
+) -> Result<(Vec<usize>, Mat<f64>), ApplyError> {
+    let mut transfer = Mat::<f64>::identity(common.len(), common.len());
     let sizes: Vec<f64> = common.iter().map(|(i, _)| a.parameters[*i].size).collect();
     let of_a = a.null_directions.iter().map(|n| common.iter().map(|(i, _)| n[*i]).collect::<Vec<f64>>());
     let of_b = b.null_directions.iter().map(|n| common.iter().map(|(_, j)| n[*j]).collect::<Vec<f64>>());
     let directions: Vec<Vec<f64>> = of_a.chain(of_b).collect();
     if directions.is_empty() {
-        return Ok(Vec::new());
+        return Ok((Vec::new(), transfer));
     }
     let scaled = Mat::from_fn(common.len(), directions.len(), |k, n| directions[n][k] / sizes[k]);
     let space = Svd::of(scaled.as_ref())?;
     let least = SAME_DIRECTION * space.singular_values.first().copied().unwrap_or(0.0).max(SAME_DIRECTION);
     let dimension = space.singular_values.iter().filter(|value| **value > least).count();
     if dimension == 0 {
-        return Ok(Vec::new());
+        return Ok((Vec::new(), transfer));
     }
     let basis = space.left().subcols(0, dimension).to_owned();
     // Parameters that a model holds already are preferred, so that its numbers stay as they are.
@@ -54,7 +55,6 @@ pub(super) fn one_gauge(
         2 - usize::from(a.parameters[i].held) - usize::from(b.parameters[j].held)
     });
     let (combinations, pivots) = echelon(basis.as_ref(), &preference, MIN_PIVOT);
-    let mut transfer = Mat::<f64>::identity(common.len(), common.len());
     for (combination, pivot) in combinations.iter().zip(&pivots) {
         for (k, share) in combination.iter().enumerate() {
             transfer[(k, *pivot)] -= share * sizes[k] / sizes[*pivot];
@@ -67,5 +67,5 @@ pub(super) fn one_gauge(
     let constant = |k: usize| a.parameters[common[k].0].held && b.parameters[common[k].1].held;
     let mut held: Vec<usize> = (0..common.len()).filter(|k| pivots.contains(k) || constant(*k)).collect();
     held.sort_unstable();
-    Ok(held)
+    Ok((held, transfer))
 }

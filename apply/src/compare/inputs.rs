@@ -6,12 +6,12 @@ use abbe_model::component::ErrorName;
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 
-use super::results::{Comparison, ExcludedReading};
+use super::results::{Comparison, ExcludedReading, InputNotJudged};
 use super::{CompareOptions, Named, compare, one_machine};
 use crate::ApplyError;
 use abbe_identify::fit;
 use abbe_identify::model_file::{IdentifiedModel, Provenance};
-use abbe_identify::results::Outlier;
+use abbe_identify::results::{Goodness, GoodnessVerdict, Outlier};
 
 /// An input of a comparison.
 #[derive(Clone)]
@@ -50,12 +50,23 @@ impl Input {
     }
 }
 
-/// The models of all inputs, each with the readings that its fit excludes as outliers. Sessions are fitted with the errors and effects that any input has: those of models too,
+/// An input as it is compared.
+struct Prepared {
+    model: IdentifiedModel,
+    /// The readings that its fit excludes.
+    outliers: Vec<Outlier>,
+    not_judged: Option<NotQuotable>,
+}
+
+/// √(χ²/ν) of an input whose estimates are not to be quoted, and why; whether it is a session.
+type NotQuotable = (bool, f64, &'static str);
+
+/// The models of all inputs. Sessions are fitted with the errors and effects that any input has: those of models too,
 /// since a session without the effects of a model differs from it by their bias.
 ///
 /// # Errors
 /// If a session cannot be fitted, for example because its data lack what an effect follows.
-fn models(inputs: Vec<Input>, seed: u64) -> Result<Vec<(IdentifiedModel, Vec<Outlier>)>, ApplyError> {
+fn models(inputs: Vec<Input>, seed: u64) -> Result<Vec<Prepared>, ApplyError> {
     let mut errors: Vec<ErrorName> = Vec::new();
     let mut effects: Vec<Effect> = Vec::new();
     for input in &inputs {
@@ -71,14 +82,25 @@ fn models(inputs: Vec<Input>, seed: u64) -> Result<Vec<(IdentifiedModel, Vec<Out
         }
     }
     let model = |input: Input| match input {
-        Input::Model(model) => Ok((*model, Vec::new())),
+        Input::Model(model) => {
+            // A model states only that its residual exceeded the noise.
+            let enlargement = model.quality.u_enlargement;
+            let exceeds = Goodness::default().with_verdict(GoodnessVerdict::Exceeds).forbids_decisions();
+            let not_judged = exceeds.filter(|_| enlargement > 1.0).map(|why| (false, enlargement, why));
+            Ok(Prepared { model: *model, outliers: Vec::new(), not_judged })
+        }
         Input::Session(session) => {
             let own = session.effects.iter().filter(|effect| !effect.tests.is_empty()).cloned();
             let effects = effects.iter().cloned().chain(own).collect();
             let session = Session { unknowns: errors.clone(), effects, ..*session };
             let (problem, fit) = fit::prepare(&session, seed)?;
-            let outliers = fit::outliers(&problem, &fit);
-            Ok((IdentifiedModel::of_fit(&problem, &fit, Provenance::default())?, outliers))
+            let goodness = fit::outcome::goodness(&problem, &fit);
+            let not_judged = goodness.forbids_decisions().filter(|_| !goodness.quotable);
+            Ok(Prepared {
+                model: IdentifiedModel::of_fit(&problem, &fit, Provenance::default())?,
+                outliers: fit::outliers(&problem, &fit),
+                not_judged: not_judged.map(|why| (true, fit.birge_ratio, why)),
+            })
         }
     };
     inputs.into_iter().map(model).collect()
@@ -97,11 +119,28 @@ pub fn compare_inputs(
     for (name, input) in names.iter().zip(&inputs).skip(1) {
         one_machine((&names[0], inputs[0].machine()), (name, input.machine()))?;
     }
-    let (models, outliers): (Vec<IdentifiedModel>, Vec<Vec<Outlier>>) = models(inputs, seed)?.into_iter().unzip();
-    let excluded = names.iter().zip(outliers).flat_map(|(input, outliers)| {
-        outliers.into_iter().map(|outlier| ExcludedReading { input: input.clone(), outlier })
+    let prepared = models(inputs, seed)?;
+    let excluded = names.iter().zip(&prepared).flat_map(|(input, own)| {
+        own.outliers.iter().map(|outlier| ExcludedReading { input: input.clone(), outlier: outlier.clone() })
     });
     let outliers = excluded.collect();
-    let named: Vec<Named<'_>> = names.into_iter().zip(&models).map(|(name, model)| Named { name, model }).collect();
-    Ok(Comparison { outliers, ..compare(&named, options)? })
+    let not_judged: Vec<InputNotJudged> = (names.iter().zip(&prepared))
+        .filter_map(|(input, own)| {
+            let (is_session, birge_ratio, why) = own.not_judged?;
+            Some(InputNotJudged { input: input.clone(), is_session, birge_ratio, why: why.to_string() })
+        })
+        .collect();
+    let named = names.into_iter().zip(&prepared).map(|(name, own)| Named { name, model: &own.model });
+    let mut found = Comparison { outliers, ..compare(&named.collect::<Vec<_>>(), options)? };
+    // An effect that a model lacks biases its estimates, and no uncertainty of a difference covers that.
+    let is_judged = |from: &str, to: &str| !not_judged.iter().any(|own| own.input == from || own.input == to);
+    for pair in found.pairs.iter_mut().filter(|pair| !is_judged(&pair.from, &pair.to)) {
+        (pair.judged, pair.significant) = (false, 0);
+        pair.single_changes.clear();
+    }
+    for difference in &mut found.differences {
+        difference.significant &= is_judged(&difference.from, &difference.to);
+    }
+    found.not_judged = not_judged;
+    Ok(found)
 }

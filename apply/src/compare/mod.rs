@@ -13,7 +13,7 @@
 //! most the level.
 //!
 //! - `inputs`: sessions and models with the same parameters; `shared`: the covariance of two models with a common
-//!   set-up, which the readings test; `gauge`: one gauge for both;
+//!   set-up, which the readings test; `gauge`: one gauge for both; `single`: one change that explains all differences;
 //! - [`workspace`]: the volumetric error of each model over the common range;
 //! - [`results`]: the reported comparison.
 
@@ -21,6 +21,7 @@ mod gauge;
 mod inputs;
 pub mod results;
 mod shared;
+mod single;
 mod statements;
 pub mod workspace;
 
@@ -60,7 +61,7 @@ pub struct CompareOptions {
 
 impl Default for CompareOptions {
     fn default() -> Self {
-        CompareOptions { significance: SIGNIFICANCE, shared: None, places: 5 }
+        CompareOptions { significance: SIGNIFICANCE, shared: None, places: workspace::PLACES }
     }
 }
 
@@ -131,7 +132,7 @@ fn pair(a: &Named<'_>, b: &Named<'_>, options: &CompareOptions) -> Result<Compar
     }
     let SharedDifference { mut delta, mut covariance, shared, refuted } =
         shared::difference(a.model, b.model, &common, options.shared.as_deref())?;
-    let held = gauge::one_gauge(a.model, b.model, &common, &mut delta, &mut covariance)?;
+    let (held, transfer) = gauge::one_gauge(a.model, b.model, &common, &mut delta, &mut covariance)?;
     let id = |k: usize| a.model.parameters[common[k].0].id.clone();
     let mut differences = Vec::new();
     for k in (0..common.len()).filter(|k| !held.contains(k)) {
@@ -159,7 +160,9 @@ fn pair(a: &Named<'_>, b: &Named<'_>, options: &CompareOptions) -> Result<Compar
                           separates the errors, or identify fewer of them";
         return Err(apart(a, b, difference));
     }
-    let (chi_square, degrees_of_freedom) = chi_square(&delta, &covariance, &kept)?;
+    let metric = Metric::of(&covariance, &kept)?;
+    let chi_square: f64 = metric.whitened(&delta).iter().map(|value| value * value).sum();
+    let degrees_of_freedom = metric.rank();
     let only = |own: &IdentifiedModel, of: &Named<'_>, side: fn(&(usize, usize)) -> usize| -> Vec<OnlyIn> {
         let missing = own.carried_parameters().into_iter().filter(|j| !common.iter().any(|pair| side(pair) == *j));
         let mut ids: BTreeMap<String, ()> = BTreeMap::new();
@@ -175,11 +178,18 @@ fn pair(a: &Named<'_>, b: &Named<'_>, options: &CompareOptions) -> Result<Compar
     let mut only_in = only(a.model, a, |pair| pair.0);
     only_in.extend(only(b.model, b, |pair| pair.1));
     differences.sort_by(|x, y| x.p_value.total_cmp(&y.p_value));
+    let significant = differences.iter().filter(|difference| difference.significant).count();
+    let single_changes = match significant {
+        0 => Vec::new(),
+        _ => single::explanations(a, &common, &delta, &transfer, &metric),
+    };
     let summary = Pair {
         from: a.name.clone(),
         to: b.name.clone(),
         compared: kept.len(),
-        significant: differences.iter().filter(|difference| difference.significant).count(),
+        judged: true,
+        significant,
+        single_changes,
         chi_square,
         degrees_of_freedom,
         p_value: chi_square_tail(chi_square, degrees_of_freedom as f64),
@@ -223,21 +233,37 @@ fn holm(differences: &mut [Difference], level: f64) {
     }
 }
 
-/// `δᵀ·Cov(δ)⁺·δ` over the kept parameters, and the rank.
-fn chi_square(delta: &[f64], covariance: &Mat<f64>, kept: &[usize]) -> Result<(f64, usize), ApplyError> {
-    let u: Vec<f64> = kept.iter().map(|k| covariance[(*k, *k)].sqrt()).collect();
-    let scaled = Mat::from_fn(kept.len(), kept.len(), |i, j| covariance[(kept[i], kept[j])] / (u[i] * u[j]));
-    let eigen = Symmetric::of(scaled.as_ref())?;
-    let largest = eigen.values.iter().copied().fold(0.0, f64::max);
-    let (mut sum, mut rank) = (0.0, 0);
-    for (value, vector) in eigen.values.iter().zip(eigen.vectors.col_iter()) {
-        if *value > LEAST_EIGENVALUE * largest {
-            let along: f64 = kept.iter().zip(&u).zip(vector.iter()).map(|((k, u), v)| delta[*k] / u * v).sum();
-            sum += along * along / value;
-            rank += 1;
-        }
+/// The metric of `Cov(δ)⁺` over the kept parameters.
+struct Metric<'k> {
+    kept: &'k [usize],
+    /// One row for each direction that the covariance determines.
+    root: Vec<Vec<f64>>,
+}
+
+impl Metric<'_> {
+    fn of<'k>(covariance: &Mat<f64>, kept: &'k [usize]) -> Result<Metric<'k>, ApplyError> {
+        let u: Vec<f64> = kept.iter().map(|k| covariance[(*k, *k)].sqrt()).collect();
+        let scaled = Mat::from_fn(kept.len(), kept.len(), |i, j| covariance[(kept[i], kept[j])] / (u[i] * u[j]));
+        let eigen = Symmetric::of(scaled.as_ref())?;
+        let largest = eigen.values.iter().copied().fold(0.0, f64::max);
+        let directions = eigen.values.iter().zip(eigen.vectors.col_iter());
+        let directions = directions.filter(|(value, _)| **value > LEAST_EIGENVALUE * largest);
+        let row = |value: f64, vector: &[f64]| vector.iter().zip(&u).map(|(v, u)| v / (u * value.sqrt())).collect();
+        let root =
+            directions.map(|(value, vector)| row(*value, &vector.iter().copied().collect::<Vec<f64>>())).collect();
+        Ok(Metric { kept, root })
     }
-    Ok((sum, rank))
+
+    /// Number of directions.
+    fn rank(&self) -> usize {
+        self.root.len()
+    }
+
+    /// A vector over the common parameters in independent units of its uncertainty.
+    fn whitened(&self, of: &[f64]) -> Vec<f64> {
+        let along = |row: &Vec<f64>| self.kept.iter().zip(row).map(|(k, share)| of[*k] * share).sum();
+        self.root.iter().map(along).collect()
+    }
 }
 
 #[cfg(test)]

@@ -21,8 +21,24 @@ pub struct Comparison {
     pub pairs: Vec<Pair>,
     /// The readings that the fits of the sessions excluded as outliers.
     pub outliers: Vec<ExcludedReading>,
+    /// The inputs whose model lacks an effect, or whose readings are in a doubtful unit. Their differences are not judged.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub not_judged: Vec<InputNotJudged>,
     /// The volumetric error over the common range of axes, one entry per input; empty if it was not evaluated.
     pub workspace: Vec<VolumetricSummary>,
+}
+
+/// An input whose own estimates are not to be quoted, so that no difference from them is judged.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct InputNotJudged {
+    /// The session or model.
+    pub input: String,
+    /// Whether it is a session, which can be traced.
+    pub is_session: bool,
+    /// √(χ²/ν) of its fit.
+    pub birge_ratio: f64,
+    /// Why nothing can be decided from its estimates.
+    pub why: String,
 }
 
 /// A reading of a session that its fit excluded as an outlier.
@@ -52,7 +68,8 @@ pub struct Difference {
     pub unit: String,
     /// Probability of a larger difference by chance, for this parameter alone.
     pub p_value: f64,
-    /// Whether the difference is significant at the level over all parameters of the pair (Holm).
+    /// Whether the difference is significant at the level over all parameters of the pair (Holm). Not if the pair is not
+    /// judged.
     pub significant: bool,
 }
 
@@ -65,8 +82,13 @@ pub struct Pair {
     pub to: String,
     /// Number of parameters that are compared.
     pub compared: usize,
+    /// Whether the differences are judged: the estimates of both inputs may be quoted.
+    pub judged: bool,
     /// Number of significant differences.
     pub significant: usize,
+    /// Single changes that explain all differences, the most probable first; empty if none does, or nothing differs.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub single_changes: Vec<SingleChange>,
     /// χ² of all differences together.
     pub chi_square: f64,
     /// Its degrees of freedom.
@@ -84,6 +106,25 @@ pub struct Pair {
     pub not_comparable: Vec<NotComparable>,
     /// Effects and errors that only one of the inputs has.
     pub only_in: Vec<OnlyIn>,
+}
+
+/// A change of one parameter alone that explains all differences of a pair.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct SingleChange {
+    /// The parameter, which may be one that is held at nominal.
+    pub id: String,
+    /// Its change, in `unit`.
+    pub value: f64,
+    /// Standard uncertainty, in `unit`.
+    pub u: f64,
+    /// Unit of `value` and `u`.
+    pub unit: String,
+    /// χ² of what it leaves of the differences.
+    pub chi_square: f64,
+    /// Probability of a larger remainder by chance.
+    pub p_value: f64,
+    /// Probability that it is this change, among all changes of one parameter.
+    pub probability: f64,
 }
 
 /// A set-up quantity of one name that is not one object in both sessions.

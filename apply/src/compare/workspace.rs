@@ -22,8 +22,11 @@ use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::model_file::carried::States;
 use abbe_identify::model_file::errors::EstimatedErrors;
 use abbe_identify::numerics::parallel;
+use abbe_identify::results::validation::MovedParameter;
 use abbe_model::pose::Aim;
 
+/// Places along each axis, if the caller states none.
+pub const PLACES: usize = 5;
 /// Maximum number of points.
 const MAX_POINTS: usize = 4096;
 
@@ -80,6 +83,23 @@ pub fn evaluate(models: &[&IdentifiedModel], places: usize) -> Result<Vec<Volume
     let axes: Vec<AxisRange> =
         machine.axes.iter().zip(&ranges).map(|(axis, range)| AxisRange::of(axis, *range)).collect();
     models.iter().map(|model| of_model(model, first.tool_mm, &grid, axes.clone())).collect()
+}
+
+/// The volumetric error of a model and of the same model with parameters that have moved, rms in µm; empty if none has, or
+/// if the axes have no range.
+///
+/// # Errors
+/// If an error cannot be evaluated on the grid.
+pub fn rms_of_moved(model: &IdentifiedModel, moved: &[MovedParameter]) -> Result<Vec<f64>, ApplyError> {
+    if moved.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut after = model.clone();
+    for parameter in &mut after.parameters {
+        let changes = moved.iter().filter(|change| change.id == parameter.id);
+        parameter.value += changes.map(|change| change.value).sum::<f64>() / parameter.unit.display_per_internal;
+    }
+    Ok(evaluate(&[model, &after], PLACES)?.iter().map(|volume| volume.rms_um).collect())
 }
 
 /// The range of every axis that all models cover; `None` if there is none.

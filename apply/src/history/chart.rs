@@ -11,6 +11,8 @@ pub const EWMA_WEIGHT: f64 = 0.2;
 /// Limit of the moving average, standard deviations: an average run of 500 sessions to a false alarm (Lucas and
 /// Saccucci 1990, Table 3).
 pub const EWMA_LIMIT: f64 = 2.962;
+/// Share of an uncertainty below which a deviation is rounding.
+const ROUNDING: f64 = 1e-6;
 /// Sessions of the reference, or half of all if they are fewer.
 const REFERENCE: usize = 6;
 
@@ -35,7 +37,7 @@ impl ChartPoint {
 pub struct Charts {
     /// The reference value after the last step.
     pub reference: f64,
-    /// The sessions. Those of the reference are at zero.
+    /// The sessions. The average of those of the reference is zero.
     pub points: Vec<ChartPoint>,
 }
 
@@ -61,7 +63,14 @@ impl Charts {
         let weight: f64 = u[..count].iter().map(|u| u.powi(-2)).sum();
         let reference = values[..count].iter().zip(u).map(|(value, u)| value / (u * u)).sum::<f64>() / weight;
         let variance = 1.0 / weight;
-        let mut points = vec![ChartPoint::default(); count];
+        // The reference contains these sessions: the variance of a deviation from it is the difference.
+        let beside = |value: f64, u: f64| {
+            let deviation = (u * u - variance).max(0.0).sqrt();
+            if deviation > ROUNDING * u { (value - reference) / deviation } else { 0.0 }
+        };
+        let of_reference = values[..count].iter().zip(u);
+        let mut points: Vec<ChartPoint> =
+            of_reference.map(|(value, u)| ChartPoint { shewhart: beside(*value, *u), ewma: 0.0 }).collect();
         // The average, the variance of its independent part, and its share of the error of the reference.
         let (mut average, mut own, mut shared) = (0.0, 0.0, 0.0);
         for (value, u) in values.iter().zip(u).skip(count) {

@@ -169,6 +169,7 @@ impl<'m> Fitted<'m> {
             None => Due::NotDetermined,
         };
         let days = |session: Option<&SessionValues>| session.map_or(0.0, |session| session.days);
+        let followed = self.series.iter().filter(|series| series.sessions.last().copied() == last).count();
         MachineHistory {
             machine_id: self.machine.machine_id.clone(),
             name: self.machine.name.clone(),
@@ -180,6 +181,10 @@ impl<'m> Fitted<'m> {
             due,
             due_days: first_due.as_ref().map(|due| due.0),
             due_parameter: first_due.map(|due| due.1),
+            followed,
+            determined: self.machine.determined.max(followed),
+            held_at_nominal: self.machine.held_at_nominal.clone(),
+            validation: self.machine.validation,
             out_of_control: parameters.iter().filter(|one| one.is_out_of_control()).map(|one| one.id.clone()).collect(),
             parameters,
         }

@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use abbe_identify::results::validation::ValidationVerdict;
+
 use super::DAYS_PER_YEAR;
 use super::events::ChangeEvent;
 
@@ -56,6 +58,16 @@ pub struct MachineHistory {
     pub due_parameter: Option<String>,
     /// The parameters that are out of control in their latest session.
     pub out_of_control: Vec<String>,
+    /// Number of parameters that are followed of the latest session.
+    pub followed: usize,
+    /// Number of directions of the parameters that it determines.
+    pub determined: usize,
+    /// The parameters that are held at nominal, so that the others have values.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub held_at_nominal: Vec<String>,
+    /// The verdict of the validation of the latest session, if the model of the machine does not hold; absent otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub validation: Option<ValidationVerdict>,
     /// The parameters.
     pub parameters: Vec<ParameterHistory>,
 }
@@ -136,9 +148,9 @@ pub struct PointResult {
     pub value: f64,
     /// Standard uncertainty, with `u_enlargement`.
     pub u: f64,
-    /// Deviation from the reference, standard deviations. 0 in sessions of the reference.
+    /// Deviation from the reference, standard deviations.
     pub shewhart: f64,
-    /// Exponentially weighted moving average, standard deviations.
+    /// Exponentially weighted moving average, standard deviations. 0 in sessions of the reference.
     pub ewma: f64,
     /// Whether one of the two is beyond its limit.
     pub out_of_control: bool,

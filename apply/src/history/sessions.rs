@@ -1,5 +1,7 @@
 //! What a history is made from: the parameters of one machine in each of its sessions.
 
+use abbe_identify::results::validation::ValidationVerdict;
+
 /// The sessions of one machine.
 #[derive(Clone, Debug, Default)]
 pub struct MachineSessions {
@@ -11,6 +13,12 @@ pub struct MachineSessions {
     pub code: String,
     /// The parameters: identifier, unit, meaning.
     pub parameters: Vec<(String, String, String)>,
+    /// The parameters that are held at nominal, so that the others have values: those of a base parametrisation.
+    pub held_at_nominal: Vec<String>,
+    /// Number of directions of the parameters of the machine that the latest session determines.
+    pub determined: usize,
+    /// What a validation says of the latest session, if it was validated and the model does not hold.
+    pub validation: Option<ValidationVerdict>,
     /// The sessions by time.
     pub sessions: Vec<SessionValues>,
 }

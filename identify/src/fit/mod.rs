@@ -31,7 +31,7 @@ use crate::heldout::{HeldOut, held_out};
 use crate::noise::{NoiseSource, PureError, ShownNoise};
 use crate::numerics::least_squares::{LeastSquares, Scaling, minimise};
 use crate::numerics::rank::Rank;
-use crate::numerics::tails::{chi_square_tail, residual_tail};
+use crate::numerics::tails::residual_tail;
 use crate::numerics::tolerances::MIN_IDENTIFIABLE;
 use crate::numerics::triangle::Triangle;
 use crate::parameters::{Parameter, Role};
@@ -42,6 +42,7 @@ pub use assume::{assume, statements as assumptions};
 pub use covariance::{null_space, of_parameters as covariance_of_parameters};
 pub use cover::contribution as contribution_beside_noise;
 pub use numbers::NumberInterval;
+pub(crate) use outcome::ratio_of_another_unit;
 pub use positions::StepPosition;
 pub use prepare::{NearMinimum, prepare, prepare_with, refit, with_families_linearised, with_lever};
 pub(crate) use quantities::{Quantity, quantities, values_at};
@@ -65,9 +66,10 @@ pub struct Fit {
     pub held_out: HeldOut,
     /// χ², with each prior as an observation.
     pub chi_square: f64,
-    /// Degrees of freedom of χ², at least 1.
+    /// Degrees of freedom of χ².
     pub degrees_of_freedom: usize,
-    /// The Birge ratio `√(χ²/ν)`. It is below 1 if the readings scatter less than the assumed noise.
+    /// The Birge ratio `√(χ²/ν)`. It is below 1 if the readings scatter less than the assumed noise; without degrees of
+    /// freedom it is `√χ²`.
     pub birge_ratio: f64,
     /// Probability of a larger χ² if the model lacks nothing. A noise from repeats has the degrees of freedom of their
     /// pure error.
@@ -115,7 +117,7 @@ impl LeastSquares for IdentifiableDirections<'_> {
     }
 
     fn degrees_of_freedom(&self) -> f64 {
-        freedom(self.problem, self.rank) as f64
+        freedom(self.problem, self.rank).max(1) as f64
     }
 }
 
@@ -262,11 +264,11 @@ fn named(problem: &Problem, rank: &Rank, error: IdentifyError) -> IdentifyError 
     IdentifyError::NoConvergence { iterations, sum_of_squares, step, along }
 }
 
-/// Degrees of freedom of χ², at least 1. Each prior counts as an observation, each estimated position of a step as a
+/// Degrees of freedom of χ². Each prior counts as an observation, each estimated position of a step as a
 /// parameter.
 fn freedom(problem: &Problem, rank: &Rank) -> usize {
     let estimated = rank.identifiable_basis.ncols() + problem.parameters.positions().count();
-    (problem.scalars() + problem.prior_rows()).saturating_sub(estimated).max(1)
+    (problem.scalars() + problem.prior_rows()).saturating_sub(estimated)
 }
 
 /// The rank at the nominal machine, and the parameters and triangular factors of its linearisation. The priors of
@@ -312,7 +314,7 @@ fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, IdentifyError> {
     let degrees_of_freedom = freedom(problem, &rank);
     let free = degrees_of_freedom as f64;
     let p_value = residual_tail(chi_square, free, freedom_of_noise(problem, &residuals));
-    let birge_ratio = (chi_square / free).sqrt();
+    let birge_ratio = (chi_square / free.max(1.0)).sqrt();
     let aliases = aliases::at_solution(problem, &beta)?;
     let mut fit = Fit {
         beta,
@@ -355,9 +357,14 @@ fn freedom_of_noise(problem: &Problem, residuals: &[Vec<f64>]) -> Option<usize> 
     }
 }
 
-/// Factor on the standard uncertainties: the Birge ratio `√(χ²/ν)` if it is significantly above 1, else 1.
-pub(crate) fn u_enlargement(chi_square: f64, free: f64) -> f64 {
-    if chi_square_tail(chi_square, free) < BIRGE_SIGNIFICANCE { (chi_square / free).sqrt().max(1.0) } else { 1.0 }
+/// Factor on the standard uncertainties: the Birge ratio `√(χ²/ν)` if it is significantly above 1, else 1. A noise from
+/// repeats has degrees of freedom of its own.
+pub(crate) fn u_enlargement(chi_square: f64, free: f64, of_noise: Option<usize>) -> f64 {
+    if residual_tail(chi_square, free, of_noise) < BIRGE_SIGNIFICANCE {
+        (chi_square / free).sqrt().max(1.0)
+    } else {
+        1.0
+    }
 }
 
 /// The warning about enlarged uncertainties, if they are enlarged.
@@ -379,6 +386,7 @@ mod tests {
     use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
     use super::*;
+    use crate::numerics::tails::chi_square_tail;
 
     /// A noise from repeats is known to as many degrees of freedom as its repeats have: readings of all runs but one for
     /// each place, since a mean of each place is taken off, and a straight line of each run but one.

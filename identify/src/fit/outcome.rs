@@ -4,38 +4,57 @@ use abbe_model::axis::AxisKind;
 use abbe_model::session::Prior;
 use abbe_model::words::counted;
 
-use super::{Fit, assume};
+use super::{BIRGE_SIGNIFICANCE, Fit, assume};
 use crate::error::IdentifyError;
 use crate::identifiability::determined_by_prior;
 use crate::linear::{Linearisation, is_of_interest};
 use crate::noise::NoiseSource;
 use crate::numerics::rank::Rank;
+use crate::numerics::tails::chi_square_tails;
 use crate::parameters::Role;
 use crate::plausibility::Pulls;
 use crate::problem::Problem;
 use crate::results::{
     Assumption, AssumptionKind, AssumptionVerdict, DataRange, DeterminedBy, DeterminedByPrior, Goodness,
-    GoodnessVerdict, NotEstimated, Outcome, ParameterResult,
+    GoodnessVerdict, NotEstimated, NotJudged, Outcome, ParameterResult,
 };
 
-/// χ²/ν below which the noise is said to be overstated.
+/// χ²/ν below which a residual is significantly below the noise, if it is so by chance in one of a thousand sessions.
 const MIN_RATIO: f64 = 0.5;
+/// Ratio of the residual to the stated noise below which the unit of the readings is in doubt.
+const OF_ANOTHER_UNIT: f64 = 0.1;
 
 /// The residual of a fit against the noise.
 pub fn goodness(problem: &Problem, fit: &Fit) -> Goodness {
-    let chi_square_ratio = fit.chi_square / fit.degrees_of_freedom as f64;
-    let judged = problem.noise.source.judges();
-    let verdict = if !judged {
-        GoodnessVerdict::NotJudged
-    } else if fit.exceeds_noise() {
-        GoodnessVerdict::Exceeds
-    } else if chi_square_ratio < MIN_RATIO {
-        GoodnessVerdict::NoiseOverstated
+    let chi_square_ratio = fit.birge_ratio.powi(2);
+    let not_judged = if fit.degrees_of_freedom == 0 {
+        Some(NotJudged::NoDegreesOfFreedom)
+    } else if !problem.noise.source.judges() {
+        Some(NotJudged::NoNoise)
+    } else if ratio_of_another_unit(problem, fit).is_some() {
+        Some(NotJudged::WrongUnit)
     } else {
-        GoodnessVerdict::Agrees
+        let is_below = chi_square_ratio < MIN_RATIO && fit.p_value > 1.0 - BIRGE_SIGNIFICANCE;
+        is_below.then_some(NotJudged::BelowNoise)
     };
-    let p_value = judged.then_some(fit.p_value);
-    Goodness { chi_square_ratio, p_value, ..Goodness::default() }.with_verdict(verdict)
+    let verdict = match not_judged {
+        Some(_) => GoodnessVerdict::NotJudged,
+        None if fit.exceeds_noise() => GoodnessVerdict::Exceeds,
+        None => GoodnessVerdict::Agrees,
+    };
+    let is_tested = !matches!(not_judged, Some(NotJudged::NoNoise | NotJudged::NoDegreesOfFreedom));
+    let p_value = is_tested.then_some(fit.p_value);
+    Goodness { not_judged, chi_square_ratio, p_value, ..Goodness::default() }.with_verdict(verdict)
+}
+
+/// The residual over the noise that the session states, if it is so small that the unit of the readings is in doubt. A
+/// noise of repeats is in the unit of the readings and shows nothing.
+pub(crate) fn ratio_of_another_unit(problem: &Problem, fit: &Fit) -> Option<f64> {
+    let stated_mm = problem.session.stated_noise_mm()?;
+    let ratio = fit.birge_ratio * problem.noise.sigma_mm / stated_mm;
+    let free = fit.degrees_of_freedom as f64;
+    let [by_chance, _] = chi_square_tails(free * ratio * ratio, free)?;
+    (ratio < OF_ANOTHER_UNIT && by_chance < BIRGE_SIGNIFICANCE).then_some(ratio)
 }
 
 /// What determines each parameter of a problem, by index, and the errors that set-up priors determine, in words.

@@ -72,7 +72,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
         unobservable: unobservable(problem, &fit.rank),
         null_space: covariance::null_space(problem, &fit.rank),
         outliers: outliers(problem, fit),
-        conformity: conformity(&problem.session, &parameters, &circular, noise_um, goodness.verdict),
+        conformity: conformity(&problem.session, &parameters, &circular, noise_um, goodness),
         outcome: outcome::outcome(problem, fit, goodness, &determined, contradicted),
         circular,
         positioning: positioning::of_session(&problem.session, &problem.rejected),

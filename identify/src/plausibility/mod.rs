@@ -4,7 +4,7 @@
 //! the statements that the readings contradict, and the mistakes that explain the contradiction. Conflicts are:
 //!
 //! - set-up parameters far from their stated values, each (`pulls`) and all together;
-//! - a residual of a hundred times the noise in every test;
+//! - a residual of a hundred times the noise in every test, or of less than a tenth of the stated noise;
 //! - poses of which the model explains less than 99 % of the variance (`poses`);
 //! - orientations of poses of which the model leaves more than 3°;
 //! - axes more than 5 % of the link beside their place, or tilted by 0.05 rad, and zero angles above 10°, of poses
@@ -28,7 +28,7 @@ pub use pulls::{Pull, Pulls};
 pub use results::{Conflict, ConflictKind, Plausibility, Suggestion, SuggestionKind};
 
 use crate::error::IdentifyError;
-use crate::fit::Fit;
+use crate::fit::{Fit, ratio_of_another_unit};
 use crate::heldout::{rms_by_unit_mm, rms_mm};
 use crate::noise::NoiseSource;
 use crate::problem::Problem;
@@ -43,11 +43,20 @@ const WELL_EXPLAINED: f64 = 0.9999;
 const ANOTHER_SESSION: f64 = 100.0;
 /// Mistakes are searched if the residual is this many times the noise.
 const CHECK_ABOVE_SIGMA: f64 = 5.0;
+/// Largest factor that a warning states.
+const LARGEST_FACTOR: f64 = 1e9;
 /// Maximum number of set-up parameters that a warning names; it counts the others.
 const MAX_NAMED: usize = 3;
 
 /// The statements that the readings contradict, and the mistakes that explain it.
 pub fn examine(problem: &Problem, fit: &Fit) -> Plausibility {
+    let mut found = by_instrument(problem, fit);
+    found.conflicts.splice(0..0, of_another_unit(problem, fit));
+    found
+}
+
+/// The same without the unit of the readings.
+fn by_instrument(problem: &Problem, fit: &Fit) -> Plausibility {
     if !problem.session.instruments().iter().any(|kind| kind.is_two_sided()) {
         return of_poses(problem, fit);
     }
@@ -221,6 +230,28 @@ fn residual(problem: &Problem, fit: &Fit) -> Option<Conflict> {
             "the residual of every test is at least {:.0} times the noise of {:.3} µm: the readings do not belong to this session",
             least / noise,
             noise * 1e3
+        ),
+    })
+}
+
+/// A residual of less than a tenth of the stated noise.
+fn of_another_unit(problem: &Problem, fit: &Fit) -> Option<Conflict> {
+    let ratio = ratio_of_another_unit(problem, fit)?;
+    let (stated_mm, unit) = (problem.session.stated_noise_mm()?, problem.unit());
+    Some(Conflict {
+        kind: ConflictKind::Unit,
+        subject: "session".to_string(),
+        value: ratio * stated_mm * 1e3,
+        stated: stated_mm * 1e3,
+        unit: unit.name().to_string(),
+        pull: None,
+        words: format!(
+            "the residual is {:.0} times smaller than the stated noise of {}: the readings are probably in another unit than \
+             the name of their column states (mm under µm, degrees under radians), or were divided before; check them, or \
+             `{}`",
+            ratio.max(f64::MIN_POSITIVE).recip().min(LARGEST_FACTOR),
+            unit.text(stated_mm * 1e3, 3),
+            unit.noise_key()
         ),
     })
 }

@@ -27,6 +27,8 @@ pub enum ConflictKind {
     Setups,
     /// The residual of every test is at least a hundred times the noise.
     Residual,
+    /// The residual is less than a tenth of the stated noise: the readings are probably in another unit.
+    Unit,
     /// The model explains too little of the variance of the measured positions.
     ExplainedVariance,
     /// The model leaves too much of the measured orientations.

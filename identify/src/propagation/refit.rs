@@ -221,7 +221,7 @@ impl LeastSquares for SimulatedFit<'_, '_> {
     }
 
     fn degrees_of_freedom(&self) -> f64 {
-        self.refit.fit.degrees_of_freedom as f64
+        self.refit.fit.degrees_of_freedom.max(1) as f64
     }
 
     fn sum_of_squares(&self, z: &[f64]) -> f64 {

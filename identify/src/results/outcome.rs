@@ -14,15 +14,27 @@ use super::parameter::{Combination, DeterminedBy};
 pub enum GoodnessVerdict {
     /// It does.
     Agrees,
-    /// χ²/ν is below 0.5: the noise is overstated.
-    NoiseOverstated,
     /// χ²/ν is significantly above 1 (p < 0.001): the model lacks an effect.
     Exceeds,
     /// χ²/ν does not exceed 1 significantly, but the residual has structure: the model lacks an effect.
     Structured,
-    /// It cannot be judged: no noise is stated or follows from repeats, so that the residual is taken for noise.
+    /// It cannot be judged: `not_judged` says why.
     #[default]
     NotJudged,
+}
+
+/// Why a residual cannot be judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum NotJudged {
+    /// No noise is stated or follows from repeats, so that the residual is taken for noise.
+    NoNoise,
+    /// χ²/ν is significantly below 0.5 (p < 0.001): the noise is overstated.
+    BelowNoise,
+    /// The residual is less than a tenth of the noise: probably the unit of the readings is not the stated one.
+    WrongUnit,
+    /// The readings are as many as the parameters that they determine.
+    NoDegreesOfFreedom,
 }
 
 impl GoodnessVerdict {
@@ -30,7 +42,6 @@ impl GoodnessVerdict {
     pub fn word(self) -> &'static str {
         match self {
             GoodnessVerdict::Agrees => "agrees",
-            GoodnessVerdict::NoiseOverstated => "noise-overstated",
             GoodnessVerdict::Exceeds => "exceeds",
             GoodnessVerdict::Structured => "structured",
             GoodnessVerdict::NotJudged => "not-judged",
@@ -40,23 +51,6 @@ impl GoodnessVerdict {
     /// Whether the model lacks an effect. Its estimates are then biased, and no uncertainty covers that.
     pub fn lacks_an_effect(self) -> bool {
         matches!(self, GoodnessVerdict::Exceeds | GoodnessVerdict::Structured)
-    }
-
-    /// Why nothing can be decided from the estimates of the model; `None` if something can.
-    pub fn forbids_decisions(self) -> Option<&'static str> {
-        match self {
-            GoodnessVerdict::Agrees | GoodnessVerdict::NoiseOverstated => None,
-            GoodnessVerdict::Exceeds => {
-                Some("the residual exceeds the noise: the model lacks an effect, which the uncertainty does not cover")
-            }
-            GoodnessVerdict::Structured => {
-                Some("the residual has structure: the model lacks an effect, which the uncertainty does not cover")
-            }
-            GoodnessVerdict::NotJudged => Some(
-                "no noise is stated or follows from repeats: whether the model lacks an effect cannot be judged; state \
-                 `noise_um` or repeat a run",
-            ),
-        }
     }
 }
 
@@ -71,6 +65,9 @@ impl fmt::Display for GoodnessVerdict {
 pub struct Goodness {
     /// Whether the residual agrees with the noise.
     pub verdict: GoodnessVerdict,
+    /// Why it cannot be judged; absent if it is judged.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub not_judged: Option<NotJudged>,
     /// χ²/ν.
     pub chi_square_ratio: f64,
     /// Probability of a larger χ² if the model lacks nothing; absent if the residual is taken for noise. For a noise
@@ -78,7 +75,7 @@ pub struct Goodness {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub p_value: Option<f64>,
     /// Whether estimates that the readings determine may be quoted with their uncertainties. Not while the model lacks
-    /// an effect.
+    /// an effect, or the unit of the readings is in doubt.
     pub quotable: bool,
     /// Whether the uncertainties cover everything that is known to be wrong with the model. They do not cover the bias
     /// by an effect that the model lacks.
@@ -88,8 +85,39 @@ pub struct Goodness {
 impl Goodness {
     /// The same with the verdict and what follows from it.
     pub fn with_verdict(self, verdict: GoodnessVerdict) -> Goodness {
-        let complete = !verdict.lacks_an_effect();
+        let complete = !verdict.lacks_an_effect() && self.not_judged != Some(NotJudged::WrongUnit);
         Goodness { verdict, quotable: complete, u_covers_model: complete, ..self }
+    }
+
+    /// Why nothing can be decided from the estimates of the model; `None` if something can.
+    pub fn forbids_decisions(self) -> Option<&'static str> {
+        match self.verdict {
+            GoodnessVerdict::Agrees => None,
+            GoodnessVerdict::Exceeds => {
+                Some("the residual exceeds the noise: the model lacks an effect, which the uncertainty does not cover")
+            }
+            GoodnessVerdict::Structured => {
+                Some("the residual has structure: the model lacks an effect, which the uncertainty does not cover")
+            }
+            GoodnessVerdict::NotJudged => Some(match self.not_judged {
+                Some(NotJudged::BelowNoise) => {
+                    "the residual is far below the noise: whether the model lacks an effect cannot be judged; state the \
+                     noise that the instrument has"
+                }
+                Some(NotJudged::WrongUnit) => {
+                    "the residual is less than a tenth of the noise: the unit of the readings is probably not the stated \
+                     one; check units and noise"
+                }
+                Some(NotJudged::NoDegreesOfFreedom) => {
+                    "no degrees of freedom are left: whether the model lacks an effect cannot be judged; measure more \
+                     readings"
+                }
+                Some(NotJudged::NoNoise) | None => {
+                    "no noise is stated or follows from repeats: whether the model lacks an effect cannot be judged; state \
+                     `noise_um` or repeat a run"
+                }
+            }),
+        }
     }
 
     /// The same for a residual that has structure or has none.
@@ -266,8 +294,8 @@ mod tests {
             .for_each(is_its_word);
         use DeterminedBy::{BaseCombination, Nothing, Prior, Readings};
         [Readings, Prior, BaseCombination, Nothing].iter().for_each(is_its_word);
-        use GoodnessVerdict::{Agrees, Exceeds, NoiseOverstated, NotJudged, Structured};
-        [Agrees, NoiseOverstated, Exceeds, Structured, NotJudged].iter().for_each(is_its_word);
+        use GoodnessVerdict::{Agrees, Exceeds, NotJudged, Structured};
+        [Agrees, Exceeds, Structured, NotJudged].iter().for_each(is_its_word);
         use AssumptionVerdict::{Contradicted, NotTested};
         [AssumptionVerdict::Agrees, Contradicted, NotTested].iter().for_each(is_its_word);
     }

@@ -73,6 +73,10 @@ pub struct ValidationResult {
     /// Parameters that have changed, the most significant first. Where the residual of all readings is not as predicted,
     /// from the readings inside the range.
     pub moved: Vec<MovedParameter>,
+    /// The volumetric error of the model and of the model with what has moved, rms in µm over the range of its axes; empty
+    /// if nothing has moved or the axes have no range.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub volumetric_rms_um: Vec<f64>,
     /// The estimated set-up of the session.
     pub set_up: Vec<ParameterResult>,
     /// Warnings in words.

@@ -19,7 +19,7 @@ mod position;
 mod results;
 mod solve;
 
-use abbe_model::session::Session;
+use abbe_model::session::{Session, Test};
 
 pub use boundary::{Condition, Reduction, conditions, reduce};
 pub use equations::{Equations, Function, Reference};
@@ -29,6 +29,7 @@ pub use solve::{CalibrationSolution, rank_before, solve};
 use crate::error::IdentifyError;
 use crate::monte_carlo;
 pub use crate::monte_carlo::MonteCarlo;
+use crate::noise::{NoiseSource, PureError};
 
 /// The solved equations of a session.
 #[derive(Clone, Debug)]
@@ -48,14 +49,17 @@ pub struct Calibration {
     pub u_enlargement: f64,
     /// The free columns of the equations under the boundary conditions.
     pub free: Vec<usize>,
-    /// Whether the session states the noise; else it is the residual of the solution.
-    pub sigma_stated: bool,
+    /// Source of `sigma_mm`: stated by the session, repeated readings, or the residual of the solution.
+    pub noise_source: NoiseSource,
 }
 
+/// Least noise, mm.
+const LEAST_NOISE_MM: f64 = 1e-9;
 /// Noise standard deviation for the decision on the rank if the session states none, mm.
 const START_NOISE_MM: f64 = 1e-3;
 
-/// Solves the equations of a session. The noise is the session's `noise_um`, or the residual of the solution.
+/// Solves the equations of a session. The noise is the session's `noise_um`, or that of repeats, or the residual of the
+/// solution.
 ///
 /// # Errors
 /// See [`Equations::of`] and [`conditions`]; also if the session states no noise and the residual has no degrees of
@@ -71,18 +75,22 @@ pub fn calibrate(session: &Session) -> Result<Calibration, IdentifyError> {
     let unreferenced = solve(&free_radius, &reduction, stated.unwrap_or(START_NOISE_MM))?;
     let square = unreferenced.rms_mm.powi(2) * equations.rows.len() as f64;
     let freedom = unreferenced.freedom as f64;
-    let (sigma_mm, u_enlargement) = match stated {
-        Some(sigma) => (sigma, crate::fit::u_enlargement(square / sigma.powi(2), freedom)),
-        None if unreferenced.freedom == 0 => {
+    let floor = session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
+    let enlarged =
+        |sigma: f64, of_noise: Option<usize>| crate::fit::u_enlargement(square / sigma.powi(2), freedom, of_noise);
+    let (sigma_mm, u_enlargement, noise_source) = match (stated, of_repeats(session)) {
+        (Some(sigma), _) => (sigma, enlarged(sigma, None), NoiseSource::Stated),
+        (None, Some((sigma, of_noise))) => {
+            let sigma = sigma.max(floor).max(LEAST_NOISE_MM);
+            (sigma, enlarged(sigma, Some(of_noise)), NoiseSource::Repeats)
+        }
+        (None, None) if unreferenced.freedom == 0 => {
             return Err(equations::refused(
                 "the session states no `noise_um`, and there are no more readings than parameters to estimate it from",
                 "state it, or repeat the cycle",
             ));
         }
-        None => {
-            let floor = session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
-            ((square / freedom).sqrt().max(floor).max(1e-9), 1.0)
-        }
+        (None, None) => ((square / freedom).sqrt().max(floor).max(LEAST_NOISE_MM), 1.0, NoiseSource::Residual),
     };
     let solution = solve(&equations, &reduction, sigma_mm * u_enlargement)?;
     Ok(Calibration {
@@ -91,10 +99,19 @@ pub fn calibrate(session: &Session) -> Result<Calibration, IdentifyError> {
         solution,
         sigma_mm,
         u_enlargement,
-        sigma_stated: stated.is_some(),
+        noise_source,
         free: reduction.free,
         equations,
     })
+}
+
+/// The standard deviation of repeated readings, mm, and its degrees of freedom; `None` without enough repeats.
+fn of_repeats(session: &Session) -> Option<(f64, usize)> {
+    let observed = |test: &Test| test.readings.as_ref().map_or_else(Vec::new, |readings| readings.observed.clone());
+    let observed: Vec<Vec<f64>> = session.tests.iter().map(observed).collect();
+    // A model changes all repeats of a reading by the same.
+    let pure = PureError::of(&session.tests, &observed, |_, _| true);
+    Some((pure.sigma_mm()?, pure.freedom))
 }
 
 impl Calibration {

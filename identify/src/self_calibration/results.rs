@@ -95,7 +95,7 @@ pub struct SelfCalibration {
     pub readings: usize,
     /// Standard uncertainty of a reading, µm.
     pub noise_um: f64,
-    /// Source of `noise_um`: `stated` by the session, or `residual` of the solution.
+    /// Source of `noise_um`: `stated` by the session, `repeats`, or `residual` of the solution.
     pub noise_source: NoiseSource,
     /// Root mean square of the residual of the solution, µm.
     pub rms_um: f64,
@@ -177,7 +177,7 @@ impl Calibration {
             method: "self-calibration".into(),
             readings: self.equations.rows.len(),
             noise_um: self.sigma_mm * 1e3,
-            noise_source: if self.sigma_stated { NoiseSource::Stated } else { NoiseSource::Residual },
+            noise_source: self.noise_source,
             rms_um: self.solution.rms_mm * 1e3,
             value_count: columns,
             rank_without_conditions: self.rank_before,

@@ -8,7 +8,7 @@ use super::results::{Conformity, ConformityItem};
 use super::rule::{Decision, Rule};
 use crate::circular::CircularTest;
 use crate::quantity::Given;
-use crate::results::{GoodnessVerdict, ParameterResult};
+use crate::results::{Goodness, NotJudged, ParameterResult};
 
 /// The decisions about the results of a session; `None` if it states no limits. None is made about a parameter while the
 /// model lacks an effect, or cannot be judged.
@@ -17,7 +17,7 @@ pub fn conformity(
     parameters: &[ParameterResult],
     circular: &[CircularTest],
     noise_um: f64,
-    goodness: GoodnessVerdict,
+    goodness: Goodness,
 ) -> Option<Conformity> {
     let Tolerance { probability, limits } = session.tolerance.as_ref()?;
     let items: Vec<ConformityItem> = limits
@@ -31,8 +31,10 @@ pub fn conformity(
             };
             let forbidden = match limit.of {
                 Toleranced::Parameter(_) => goodness.forbids_decisions(),
-                // A figure of a test follows from its readings without the model.
-                Toleranced::Figure { .. } => None,
+                // A figure of a test follows from its readings without the model, but not without their unit.
+                Toleranced::Figure { .. } => {
+                    goodness.forbids_decisions().filter(|_| goodness.not_judged == Some(NotJudged::WrongUnit))
+                }
             };
             item(limit, *probability, measured, forbidden)
         })

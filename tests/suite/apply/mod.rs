@@ -1,6 +1,7 @@
 //! Models compared, exported and compensated.
 
 pub mod compare_figures;
+pub mod compare_judged;
 pub mod compensation;
 pub mod history_figures;
 pub mod model_commands;

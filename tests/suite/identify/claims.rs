@@ -6,7 +6,7 @@ use std::sync::Arc;
 use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::noise::NoiseSource;
-use abbe::identify::results::{EffectName, TraceResult, TraceVerdict};
+use abbe::identify::results::{EffectName, NextStep, Statements, TraceResult, TraceVerdict};
 use abbe::model::session::Session;
 use abbe::trace::{TraceOptions, trace};
 use rand::SeedableRng;
@@ -197,4 +197,39 @@ fn mislabelled_runs_cause_neither_false_claims_nor_missed_effects() {
             assert_eq!(named, how != "all one", "{what}: {:?}", result.warnings);
         }
     }
+}
+
+/// A ball that drifts contradicts the stated set-up of the declared model. The found drift removes the contradiction: it is not
+/// printed beside the explanation, and nothing asks for a corrected session.
+#[test]
+fn a_conflict_that_the_found_effects_remove_is_not_stated() {
+    let mut explained = 0;
+    for seed in 0..12 {
+        let component = [Component::Location(Freedom::Z, AxisName::A), Component::Location(Freedom::Y, AxisName::A)];
+        let drift = Injected::new(component[seed as usize % 2], Driver::Time, Shape::Drift, 25.0);
+        let folder = tempfile::tempdir().unwrap();
+        let recipe = Recipe::new(Kind::Rotary, 900 + seed).readings(400).with(drift);
+        recipe.draw().write(folder.path()).unwrap();
+        let session = files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
+        let (problem, fit) = prepare(&session, 1).unwrap();
+        let declared = report(&problem, &fit).unwrap();
+        if declared.plausibility.conflicts.is_empty() {
+            continue;
+        }
+        let found = trace(&session, &TraceOptions::default(), &|_| true).unwrap();
+        if found.result.verdict != TraceVerdict::Explained {
+            continue;
+        }
+        let statements = Statements::of_trace(&found.after, &found.result);
+        assert!(found.result.plausibility.conflicts.is_empty(), "{seed}: {:?}", found.result.plausibility.conflicts);
+        assert_ne!(statements.measure.step, NextStep::CorrectSession, "{seed}");
+        let words = found.result.warnings.join("; ");
+        assert!(!words.contains("contradict") && !words.contains("stated values"), "{seed}: {words}");
+        explained += 1;
+        if explained == 2 {
+            break;
+        }
+    }
+    println!("{explained} explained, with a conflict of the declared model");
+    assert!(explained > 0);
 }

@@ -1,5 +1,6 @@
 //! Fit, trace and validation: estimates, uncertainties and verdicts against independent data.
 
+pub mod below_noise;
 pub mod channels;
 pub mod circular;
 pub mod claims;

@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use abbe::files::{self, ReadOptions};
+use abbe::identify::noise::NoiseSource;
 use abbe::identify::self_calibration::{
     Calibration, Equations, Function, MonteCarlo, Reference, calibrate, conditions, rank_before, reduce, solve,
 };
@@ -434,7 +435,7 @@ fn noise_that_is_not_stated_follows_from_repeated_cycles() {
         let case = Touched { noise: (0.8e-3, random.random()), ..Touched::default() };
         touched(&mut session, &case);
         let calibration = calibrate(&session).unwrap();
-        assert!(!calibration.sigma_stated);
+        assert_eq!(calibration.noise_source, NoiseSource::Repeats);
         ratios.push(calibration.sigma_mm / 0.8e-3);
     }
     let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
@@ -463,4 +464,38 @@ fn a_session_of_another_kind_is_refused_with_a_remedy() {
     ]);
     assert_eq!(output.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&output.stderr).contains("instrument `ballbar`, not `probe`"));
+}
+
+/// `--csv` of the published methods is for programs: one value a cell, with all its digits.
+#[test]
+fn the_values_of_a_method_are_numbers_with_all_digits() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let simulated = |plan: &str| {
+        let run = abbe(&["simulate", text(&ready(plan)), "--out", text(&out), "--seed", "3", "--quiet", "--force"]);
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        out.join("session.toml")
+    };
+    for (plan, method) in
+        [("self-calibration/session.toml", "self-calibration"), ("hermle-c600u/chapter5.toml", "circle")]
+    {
+        let (session, csv, json) = (simulated(plan), folder.path().join("values.csv"), folder.path().join("m.json"));
+        let run =
+            abbe(&["fit", text(&session), "--method", method, "--csv", text(&csv), "--json", text(&json), "--quiet"]);
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        let values = std::fs::read_to_string(&csv).unwrap();
+        let mut rows = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(values.as_bytes());
+        let mut count = 0;
+        for row in rows.records() {
+            let row = row.unwrap();
+            assert!(row[3].parse::<f64>().is_ok() && (row[4].is_empty() || row[4].parse::<f64>().is_ok()), "{row:?}");
+            assert!(row.iter().all(|cell| !cell.starts_with('\'') && !cell.contains('\u{b1}')), "{row:?}");
+            count += 1;
+        }
+        assert!(count > 10, "{values}");
+        let found: serde_json::Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
+        let rms = found[if method == "circle" { "method_rms_um" } else { "rms_um" }].to_string();
+        assert!(values.contains(&rms), "{rms} in {values}");
+        std::fs::remove_dir_all(&out).unwrap();
+    }
 }

@@ -3,11 +3,13 @@
 
 use std::fmt::Write;
 use std::fs;
+use std::path::{Path, PathBuf};
 
+use abbe::apply::compare::{CompareOptions, Input, compare_inputs};
 use abbe::files::{self, ReadOptions};
-use abbe::identify::fit::{prepare, report};
+use abbe::identify::fit::{base, prepare, report};
 use abbe::identify::noise::NoiseSource;
-use abbe::identify::results::{EffectResult, FitResult, GoodnessVerdict, TraceVerdict};
+use abbe::identify::results::{EffectResult, FitResult, GoodnessVerdict, NotJudged, TraceVerdict};
 use abbe::model::session::Session;
 use abbe::trace::{TraceOptions, trace};
 use nalgebra::{Rotation3, Unit, Vector3};
@@ -15,7 +17,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
-use crate::suite::ready;
+use crate::suite::{abbe, ready, text};
 
 /// Noise of a coordinate, mm.
 const NOISE_MM: f64 = 0.03;
@@ -39,8 +41,8 @@ fn turn(about: [f64; 3], angle: f64) -> Rotation3<f64> {
 }
 
 /// A target in R at these joint angles. Each joint has a tilt and a zero error; `eccentric` is an angular error of J2 once per
-/// turn, rad.
-fn carried(target: [f64; 3], joints: [f64; 6], eccentric: f64) -> Vector3<f64> {
+/// turn, rad, and J5 is shifted by `shift_mm` along X.
+fn carried(target: [f64; 3], joints: [f64; 6], [eccentric, shift_mm]: [f64; 2]) -> Vector3<f64> {
     let mut point = Vector3::from(target);
     for (number, (direction, origin)) in JOINTS.iter().enumerate().rev() {
         let k = number as f64;
@@ -53,47 +55,76 @@ fn carried(target: [f64; 3], joints: [f64; 6], eccentric: f64) -> Vector3<f64> {
         } else {
             Rotation3::identity()
         };
-        point = origin + location * (motion * (turn(*direction, joints[number]) * (point - origin)));
+        let shift = Vector3::x() * if number == 4 { shift_mm } else { 0.0 };
+        point = origin + shift + location * (motion * (turn(*direction, joints[number]) * (point - origin)));
     }
     point
 }
 
 /// A session of these reflectors, one test each.
 fn session(seed: u64, targets: &[[f64; 3]], eccentric: f64) -> Session {
-    let mut generator = Pcg64::seed_from_u64(seed);
+    session_of(POSES, seed, targets, [eccentric, 0.0])
+}
+
+/// The same with another number of poses, and a shift of J5 in mm.
+fn session_of(poses: usize, seed: u64, targets: &[[f64; 3]], errors: [f64; 2]) -> Session {
     let folder = tempfile::tempdir().unwrap();
-    fs::copy(ready("ur10/machine.toml"), folder.path().join("machine.toml")).unwrap();
+    let file = written(folder.path(), poses, seed, targets, errors);
+    files::session(&file, &ReadOptions::default()).unwrap()
+}
+
+/// The files of this session in a folder.
+fn written(folder: &Path, poses: usize, seed: u64, targets: &[[f64; 3]], errors: [f64; 2]) -> PathBuf {
+    let mut generator = Pcg64::seed_from_u64(seed);
+    fs::copy(ready("ur10/machine.toml"), folder.join("machine.toml")).unwrap();
     let reach = [2.8; 6];
     let poses: Vec<[f64; 6]> =
-        (0..POSES).map(|_| reach.map(|most| most * (2.0 * generator.random::<f64>() - 1.0))).collect();
-    let mut text =
+        (0..poses).map(|_| reach.map(|most| most * (2.0 * generator.random::<f64>() - 1.0))).collect();
+    let mut toml =
         "[machine]\nfile = \"machine.toml\"\n[instrument]\nkind = \"tracker\"\n[unknowns]\nerrors = [\"E?0J*\"]\n"
             .to_string();
     let stands = turn([0.2, -0.3, 1.0], 0.8);
     for (number, target) in targets.iter().enumerate() {
         let mut csv = "j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg,px_mm,py_mm,pz_mm\n".to_string();
         for pose in &poses {
-            let seen = stands * carried(*target, *pose, eccentric) + Vector3::new(2500.0, 400.0, 900.0);
+            let seen = stands * carried(*target, *pose, errors) + Vector3::new(2500.0, 400.0, 900.0);
             let seen = seen.map(|x| x + NOISE_MM * generator.sample::<f64, _>(StandardNormal));
             let cells = pose.iter().map(|q| q.to_degrees()).chain(seen.iter().copied());
             let cells: Vec<String> = cells.map(|x| format!("{x:.9}")).collect();
             writeln!(csv, "{}", cells.join(",")).unwrap();
         }
-        fs::write(folder.path().join(format!("{number}.csv")), csv).unwrap();
+        fs::write(folder.join(format!("{number}.csv")), csv).unwrap();
         write!(
-            text,
+            toml,
             "[[test]]\nname = \"T{number}\"\ndata = \"{number}.csv\"\nsetup = \"S\"\npath = {{ kind = \"list\" }}\ntarget_mm = {target:?}\n\
              target_u_um = inf\n"
         )
         .unwrap();
     }
-    fs::write(folder.path().join("session.toml"), text).unwrap();
-    files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap()
+    fs::write(folder.join("session.toml"), toml).unwrap();
+    folder.join("session.toml")
 }
 
 fn fitted(session: &Session) -> FitResult {
     let (problem, fit) = prepare(session, 1).unwrap();
     report(&problem, &fit).unwrap()
+}
+
+/// Three poses of one reflector are nine numbers, and determine nine parameters: no noise is overstated, stated or not.
+#[test]
+fn as_many_parameters_as_readings_leave_no_degrees_of_freedom() {
+    for noise_mm in [None, Some(NOISE_MM)] {
+        let session = Session { noise_mm, ..session_of(3, 5, &TARGETS[..1], [0.0; 2]) };
+        let found = fitted(&session);
+        assert_eq!((found.readings, found.rank, found.degrees_of_freedom), (3, 9, 0));
+        let goodness = found.outcome.goodness;
+        assert_eq!(goodness.verdict, GoodnessVerdict::NotJudged);
+        assert_eq!(goodness.not_judged, Some(NotJudged::NoDegreesOfFreedom));
+        assert!(!found.warnings.iter().any(|warning| warning.contains("noise")), "{:?}", found.warnings);
+    }
+    // More poses can be judged.
+    let session = Session { noise_mm: Some(NOISE_MM), ..session_of(30, 5, &TARGETS[..1], [0.0; 2]) };
+    assert_eq!(fitted(&session).outcome.goodness.verdict, GoodnessVerdict::Agrees);
 }
 
 /// Over 100 sets the estimate follows χ² with 3 degrees of freedom for each pose but one, and the fit agrees with it. An
@@ -154,4 +185,81 @@ fn a_trace_is_judged_by_the_noise_of_three_reflectors() {
     assert!(clean >= 14 && explained >= 17, "{clean} {explained}");
     let (verdict, _, source) = traced(3, &TARGETS[..1], 0.0);
     assert_eq!((verdict, source), (TraceVerdict::NotJudged, NoiseSource::Residual));
+}
+
+/// A shift of J5 changes several base parameters. One parameter explains all of them: the shift, with its amount.
+#[test]
+fn one_shift_of_a_joint_is_one_change() {
+    let (shift_mm, names) = (0.2, ["before", "after"].map(str::to_string).to_vec());
+    let input = |seed: u64, shift: f64| {
+        let session = session_of(POSES, seed, &TARGETS, [0.0, shift]);
+        Input::Session(Box::new(Session { noise_mm: Some(NOISE_MM), ..session }))
+    };
+    let options = CompareOptions::default();
+    let found = compare_inputs(names.clone(), vec![input(1, 0.0), input(2, shift_mm)], &options, 1).unwrap();
+    let pair = &found.pairs[0];
+    println!("{:#?}", pair.single_changes);
+    assert!(pair.judged && pair.significant > 0, "{pair:?}");
+    let best = &pair.single_changes[0];
+    assert_eq!(best.id, "EX0J5");
+    assert!((best.value - 1e3 * shift_mm).abs() < 4.0 * best.u && best.u < 50.0, "{best:?}");
+    let sum: f64 = pair.single_changes.iter().map(|one| one.probability).sum();
+    assert!(best.probability > 0.3 && sum <= 1.0 + 1e-9, "{sum}");
+    // Nothing changed: nothing is explained.
+    let same = compare_inputs(names, vec![input(3, 0.0), input(4, 0.0)], &options, 1).unwrap();
+    assert!(same.pairs[0].significant == 0 && same.pairs[0].single_changes.is_empty());
+}
+
+/// J5 moves by 40 µm from session to session. No parameter that it changes is identifiable by itself: the history follows
+/// base parameters, all that the sessions determine, and finds the drift.
+#[test]
+fn a_joint_that_moves_in_confounded_parameters_is_found() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("fleet");
+    for k in 0..10 {
+        let own = folder.join(format!("{k:02}"));
+        fs::create_dir_all(&own).unwrap();
+        let file = written(&own, 40, 100 + k, &TARGETS, [0.0, 0.04 * k as f64]);
+        let session = fs::read_to_string(&file).unwrap();
+        let about = format!("[about]\nserial_number = \"R\"\ndate = 2026-{:02}-05\n", k + 1);
+        fs::write(&file, about + &session).unwrap();
+    }
+    let [results, json] = ["results", "history.json"].map(|name| place.path().join(name));
+    let run = abbe(&["fleet", "run", text(&folder), "--out", text(&results), "--no-trace", "--quiet"]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let run = abbe(&["fleet", "history", text(&results), "--json", text(&json)]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let screen = String::from_utf8(run.stdout).unwrap();
+    let found: serde_json::Value = serde_json::from_str(&fs::read_to_string(&json).unwrap()).unwrap();
+    let machine = &found["machines"][0];
+    let determined = machine["determined"].as_u64().unwrap();
+    assert!(machine["followed"].as_u64().unwrap() == determined && determined > 15, "{machine:#}");
+    assert!(!machine["held_at_nominal"].as_array().unwrap().is_empty());
+    assert!(!found["statements"]["correct"].as_array().unwrap().is_empty(), "{screen}");
+    assert!(!screen.contains("No machine is out of control"), "{screen}");
+    assert!(screen.contains("drifts by") || screen.contains("has shifted by"), "{screen}");
+    assert!(screen.contains(&format!("{determined} of {determined} determined parameters are followed")), "{screen}");
+}
+
+/// Rounding in the direction of an axis, as a URDF has it, makes no other base parameters: a joint's own angle and offset are
+/// held last, so that the angles of the middle joints stay free.
+#[test]
+fn rounding_in_a_direction_holds_no_other_parameters() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = written(folder.path(), POSES, 1, &TARGETS, [0.0; 2]);
+    let held = || {
+        let session = files::session(&file, &ReadOptions::default()).unwrap();
+        let (problem, fit) = prepare(&session, 1).unwrap();
+        base::report(&problem, &fit).unwrap().held_at_nominal
+    };
+    let exact = held();
+    let machine = folder.path().join("machine.toml");
+    let stated = fs::read_to_string(&machine).unwrap();
+    let rounded = stated.replace("[0, -1, 0]", "[0, -1, 0.000000000205]");
+    assert_ne!(stated, rounded);
+    fs::write(&machine, rounded).unwrap();
+    assert_eq!(held(), exact);
+    for own in ["EB0J2", "EB0J3", "EB0J4"] {
+        assert!(!exact.iter().any(|id| id == own), "{own} in {exact:?}");
+    }
 }

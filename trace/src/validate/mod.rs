@@ -175,6 +175,7 @@ pub fn validate_anew(
         },
         without,
         moved: judged.moved.clone(),
+        volumetric_rms_um: Vec::new(),
         set_up: known.set_up_estimates(&values)?,
         warnings,
     };

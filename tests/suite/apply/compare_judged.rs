@@ -1,0 +1,71 @@
+//! What a comparison may claim: a session that hides an effect is not judged, and a change is no error that remains.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::plant::{AxisName, Component, Driver, Freedom, Injected, Kind, Recipe, Shape};
+use crate::suite::{abbe, text};
+
+/// A measured session of the independent simulator, with given values of some parameters; the others follow from the seed.
+fn written(folder: &Path, name: &str, recipe: &Recipe, given: &[(&str, f64)]) -> std::path::PathBuf {
+    let value = |id: &str| given.iter().find(|(own, _)| *own == id).map(|(_, value)| *value);
+    recipe.draw_of(&recipe.plan(), value).write(&folder.join(name)).unwrap();
+    folder.join(name).join("session.toml")
+}
+
+fn compared(inputs: [&Path; 2]) -> (Value, String) {
+    let json = inputs[0].with_file_name("compared.json");
+    let run = abbe(&["compare", text(inputs[0]), text(inputs[1]), "--json", text(&json)]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    (serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap(), String::from_utf8(run.stdout).unwrap())
+}
+
+/// The machine is the same in both sessions; the second one drifts while it is measured.
+#[test]
+fn a_session_that_hides_a_drift_judges_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let drift = Component::Location(Freedom::Z, AxisName::A);
+    let clean = Recipe::new(Kind::Rotary, 11).readings(600);
+    let drifting = clean.clone().with(Injected::new(drift, Driver::Time, Shape::Drift, 40.0));
+    let before = written(folder.path(), "before", &clean, &[]);
+    let after = written(folder.path(), "after", &drifting, &[]);
+    let (found, screen) = compared([&before, &after]);
+    assert_eq!(found["pairs"][0]["judged"], false);
+    assert_eq!(found["statements"]["good"]["not_judged"], serde_json::json!([text(&after)]));
+    assert_eq!(found["statements"]["measure"]["step"], "trace");
+    for difference in found["differences"].as_array().unwrap() {
+        assert_eq!(difference["significant"], false, "{difference}");
+    }
+    assert!(screen.contains("the differences are not judged.") && !screen.contains("significant"), "{screen}");
+    let command = format!("abbe trace {} --write", text(&after));
+    assert!(screen.contains(&command), "{screen}");
+    // A model of the session says so too.
+    let model = folder.path().join("model.json");
+    assert!(abbe(&["fit", text(&after), "--save", text(&model), "--quiet"]).status.success());
+    let (found, _) = compared([&before, &model]);
+    assert_eq!(found["pairs"][0]["judged"], false);
+}
+
+/// A machine before and after its correction: what changed is not what to correct, and the volumetric error falls.
+#[test]
+fn a_correction_is_a_change_by_which_the_error_falls() {
+    let folder = tempfile::tempdir().unwrap();
+    let recipe = Recipe::new(Kind::Rotary, 12).readings(600);
+    let errors = ["EX0C", "EY0C", "EY0A", "EZ0A"];
+    let large = errors.map(|id| (id, 40.0));
+    let small = errors.map(|id| (id, 1.0));
+    let before = written(folder.path(), "before", &recipe, &large);
+    let after = written(folder.path(), "after", &Recipe { seed: 13, ..recipe }, &small);
+    let (found, screen) = compared([&before, &after]);
+    let rms = found["statements"]["good"]["volumetric_rms_um"].as_array().unwrap();
+    let [before_um, after_um] = [&rms[0], &rms[1]].map(|rms| rms.as_f64().unwrap());
+    assert!(after_um < 0.7 * before_um, "{rms:?}");
+    assert_eq!(found["statements"]["correct"], serde_json::json!([]));
+    assert!(!found["statements"]["changed"].as_array().unwrap().is_empty());
+    let first = screen.lines().next().unwrap();
+    let volume = format!("the volumetric error falls from {before_um:.2} to {after_um:.2} \u{b5}m rms");
+    assert!(first.contains(&volume), "{first}");
+    let place = |words: &str| screen.find(words).unwrap_or_else(|| panic!("{words} in {screen}"));
+    assert!(place("What has changed: ") < place("What to correct: by a change alone nothing"));
+}
