@@ -187,7 +187,8 @@ impl<'m> Lines<'m> {
 
     /// Takes what is no error off the error and its derivatives.
     fn centre(&mut self) {
-        self.error = self.centred(std::mem::take(&mut self.error));
+        let error = std::mem::take(&mut self.error);
+        self.error = self.centred(error);
         self.by_line = self.slots.iter().map(|slot| self.by_slot(*slot)).collect();
     }
 
