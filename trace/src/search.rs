@@ -105,11 +105,11 @@ fn with_smooth_shapes(
     record: &mut SearchRecord<'_>,
     judge: &impl Fn(&SearchState<'_>) -> Result<RefittedModel, IdentifyError>,
 ) -> Result<Option<(f64, RefittedModel)>, IdentifyError> {
-    let staircases = search.staircases();
-    if staircases.is_empty() {
+    if search.staircases().is_empty() {
         return Ok(None);
     }
     let (found, steps, strongest) = (search.clone(), std::mem::take(&mut record.steps), record.strongest.clone());
+    let staircases = search.all_staircases();
     search.restart_without(&staircases);
     let ended = search_on(search, record)?;
     if found.predicts_better_than(&search.selection) {

@@ -15,6 +15,17 @@ use crate::candidates::gain::TrainedModel;
 use crate::candidates::step_table::{StepTable, best_step_table};
 use crate::constants::{MIN_PLAUSIBLE_SIGMA, REGULAR};
 
+/// The range of each shape number over the members of a library, by identifier.
+pub(super) fn number_ranges(library: &[Candidate]) -> HashMap<String, Vec<[f64; 2]>> {
+    let mut ranges: HashMap<String, Vec<[f64; 2]>> = HashMap::new();
+    for member in library {
+        let own = member.brackets();
+        let all = ranges.entry(member.effect.id()).or_insert_with(|| own.clone());
+        all.iter_mut().zip(own).for_each(|(all, [low, high])| *all = [all[0].min(low), all[1].max(high)]);
+    }
+    ranges
+}
+
 impl SearchState<'_> {
     /// Judges for each candidate whether it is detectable at its largest plausible size.
     pub(super) fn judge_detectability(&mut self) -> Result<(), IdentifyError> {
@@ -109,12 +120,7 @@ impl SearchState<'_> {
     /// no value, as of a spike that decays before the next reading. `found` are the selected effects as estimated.
     pub fn beyond_library(&self, found: &[Effect]) -> Vec<String> {
         let is_beyond = |effect: &Effect| {
-            let id = effect.id();
-            let members = self.candidates.iter().filter(|own| own.tuned_on.is_empty() && own.effect.id() == id);
-            let ranges = members.map(|own| own.brackets()).reduce(|mut all, own| {
-                all.iter_mut().zip(own).for_each(|(all, [low, high])| *all = [all[0].min(low), all[1].max(high)]);
-                all
-            });
+            let ranges = self.number_ranges.get(&effect.id());
             let outside =
                 |(which, [low, high]): (usize, &[f64; 2])| !(*low..=*high).contains(&effect.shape.number(which));
             ranges.is_some_and(|ranges| ranges.iter().enumerate().any(outside))
@@ -141,6 +147,12 @@ impl SearchState<'_> {
         };
         let selected = self.selected().iter().map(|selected| self.effect(selected.candidate));
         selected.filter(|effect| irregular(effect)).map(Effect::id).collect()
+    }
+
+    /// The identifiers of all staircases that the search can form.
+    pub fn all_staircases(&self) -> Vec<String> {
+        let has_positions = |own: &&Arc<Candidate>| own.dictionary && !own.effect.shape.positions().is_empty();
+        self.candidates.iter().filter(has_positions).map(|own| own.effect.id()).collect()
     }
 
     /// Removes effects from every branch, by identifier, and searches them no more.
