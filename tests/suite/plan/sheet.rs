@@ -98,7 +98,10 @@ fn the_sheet_centres_where_the_program_does() {
                 let after = test.split_once(words)?.1;
                 let text: String = after.split('<').filter(|part| part.contains('\u{a0}')).take(1).collect();
                 let text = text.rsplit('>').next()?.to_string();
-                let of_axis = |part: &str| part.trim().ends_with('°').then(|| part.trim().to_string());
+                let of_axis = |part: &str| {
+                    let part = part.trim().trim_end_matches('.');
+                    part.ends_with('°').then(|| part.to_string())
+                };
                 Some(text.split(", ").filter_map(of_axis).collect::<Vec<String>>())
             };
             let (Some(coincide), Some(begins)) = (rotary("Both balls coincide at "), rotary("Motion begins at")) else {
