@@ -35,9 +35,20 @@ pub(crate) fn title(equation: &Equation) -> Vec<String> {
     let code = equation.machine.code();
     let name = match &equation.machine.name {
         name if *name == code || name.is_empty() => String::new(),
-        name => format!("{name}, "),
+        name => format!("{}, ", in_comment(name)),
     };
     vec![format!("{what}: {name}{code}; {order}{rotation}."), format!("Written by Abbe {}.", env!("CARGO_PKG_VERSION"))]
+}
+
+/// A text of the session in a comment or a string of documentation, without what ends one in a language (`*/`, `\"\"\"`),
+/// joins it with the next line (`\`) or turns the direction of writing.
+fn in_comment(text: &str) -> String {
+    let is_harmless = |c: char| match c {
+        '*' | '"' | '\\' | '`' => false,
+        c if c.is_ascii() => !c.is_ascii_control(),
+        c => c.is_alphanumeric() || "°·−×±–²³″′".contains(c),
+    };
+    text.chars().map(|c| if is_harmless(c) { c } else { '_' }).collect()
 }
 
 /// The label of the reading: `eq:ldbb-C150`.
@@ -155,7 +166,7 @@ pub(crate) fn meaning(equation: &Equation, variable: &Variable) -> String {
         }
         Variable::Length(name) => {
             let stated = equation.meanings.iter().find(|(known, _)| known == name);
-            stated.map_or_else(|| variable.meaning(), |(_, meaning)| meaning.clone())
+            stated.map_or_else(|| variable.meaning(), |(_, meaning)| in_comment(meaning))
         }
         other => match equation.held.iter().find(|(held, _)| held == other) {
             Some((_, at)) if other.is_angle() => {
@@ -164,5 +175,18 @@ pub(crate) fn meaning(equation: &Equation, variable: &Variable) -> String {
             Some((_, at)) => format!("{}, held at {} mm", other.meaning(), two_places(*at)),
             None => other.meaning(),
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::in_comment;
+
+    #[test]
+    fn a_name_does_not_end_its_comment() {
+        assert_eq!(in_comment("x */ int evil(); /*"), "x _/ int evil(); /_");
+        assert_eq!(in_comment("\"\"\"\nimport os\\"), "____import os_");
+        assert_eq!(in_comment("R\u{202e}fliame"), "R_fliame");
+        assert_eq!(in_comment("Länge in µm, 90° (A/B)"), "Länge in µm, 90° (A/B)");
     }
 }
