@@ -74,8 +74,11 @@ pub(super) fn has_extension(file: &Path, known: &[&str]) -> bool {
 /// Bytes at the start of a file from which a format is recognised.
 const START_BYTES: u64 = 1024;
 
-/// Whether a file that can be read starts as `expected` says.
+/// Whether a file that can be read starts as `expected` says. A pipe, which can be read once, has no format of its own.
 pub(super) fn starts_with(file: &Path, store: &Store, expected: impl Fn(&str) -> bool) -> bool {
+    if !store.state(file).is_ok_and(|found| found.regular) {
+        return false;
+    }
     let mut start = Vec::new();
     let read = store.open(file).and_then(|opened| opened.take(START_BYTES).read_to_end(&mut start));
     read.is_ok() && expected(&String::from_utf8_lossy(&start))
