@@ -281,7 +281,7 @@ fn the_path_control_is_stated_and_given_back() {
             let numbered = NcOptions { number: Some(7000), ..NcOptions::default() };
             let files = nc::files(&session, nc::control(word).unwrap(), &numbered).unwrap().files;
             assert!(
-                files[0].1.contains("O7000 (MAIN)") && files[0].1.contains("G65 P7006 (TANGENTIAL)"),
+                files[0].1.contains("O7000 (MAIN)") && files[0].1.contains("G65 P7006 (TEST TANGENTIAL)"),
                 "{}",
                 files[0].1
             );

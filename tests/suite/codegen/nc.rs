@@ -125,7 +125,7 @@ fn numbers_and_increments_of_a_fanuc() {
         let output = abbe(&[&fixed[..], options].concat());
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
         let main = std::fs::read_to_string(out.join("main.nc")).unwrap();
-        assert!(main.contains("O7000 (MAIN)\nG65 P7001 (A100)\nG65 P7002 (A150)"), "{main}");
+        assert!(main.contains("O7000 (MAIN)\nG65 P7001 (TEST A100)\nG65 P7002 (TEST A150)"), "{main}");
         let program = std::fs::read_to_string(out.join("A150.nc")).unwrap();
         assert!(program.contains("O7002 (A150)"), "{program}");
         let motions = program.lines().filter(|line| line.starts_with("G1 ") || line.starts_with("G91 G1 "));

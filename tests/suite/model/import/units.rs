@@ -18,8 +18,8 @@ const FOLLOW: &str =
     "path = { kind = \"follow\", axis = \"C\", step_deg = 10, programmed_feed_mm_min = 1000, runs = 1 }";
 /// C turns alone under a nest on its axis.
 const ALONE: &str = "at = { x_mm = 0, y_mm = 0, z_mm = 60 }\nsweep = { axis = \"C\", from_deg = 0, to_deg = 360, step_deg = 10, feed_deg_min = 600, runs = 1 }";
-/// No motion.
-const NONE: &str = "at = { x_mm = 0, y_mm = 0, z_mm = 60 }";
+/// No motion: the file is awaited.
+const NONE: &str = "data = \"T.csv\"\nat = { x_mm = 0, y_mm = 0, z_mm = 60 }";
 
 fn session(folder: &Path, radius_mm: f64, motion: &str) -> PathBuf {
     std::fs::create_dir_all(folder).unwrap();
@@ -33,12 +33,13 @@ fn session(folder: &Path, radius_mm: f64, motion: &str) -> PathBuf {
     plan
 }
 
-/// Rows of C in degrees, the nest in mm, and deviations in mm: an eccentricity of 20 µm and 5 µm upwards.
+/// Rows of C in degrees, the nest in mm, and deviations in mm: 5 µm upwards, and 20 µm across that the table turns with, or
+/// turns away under a tool that stands.
 fn rows(radius_mm: f64) -> impl Iterator<Item = [f64; 7]> {
     (0..=36).map(move |k| {
         let c = f64::from(k) * 10.0;
         let (sin, cos) = c.to_radians().sin_cos();
-        [c, radius_mm * cos, radius_mm * sin, 60.0, 0.02 * cos, 0.02 * sin, 0.005]
+        [c, radius_mm * cos, radius_mm * sin, 60.0, 0.02 * cos, if radius_mm > 0.0 { 0.02 } else { -0.02 } * sin, 0.005]
     })
 }
 
