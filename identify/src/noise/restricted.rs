@@ -283,7 +283,7 @@ impl LaggedStretches<'_> {
 /// The predictions of a value of a process of unit variance from values before it.
 pub(super) struct Predictions {
     /// For each number of values before it, up to the order: their coefficients, the last value first.
-    coefficients: Vec<Vec<f64>>,
+    pub coefficients: Vec<Vec<f64>>,
     /// For each number of values before it: the variance that these leave.
     pub variances: Vec<f64>,
 }
@@ -307,7 +307,7 @@ impl Predictions {
         &self.coefficients[self.coefficients.len() - 1]
     }
 
-    fn variance(&self, past: usize) -> f64 {
+    pub fn variance(&self, past: usize) -> f64 {
         self.variances[past.min(self.variances.len() - 1)]
     }
 
