@@ -94,7 +94,8 @@ pub(super) struct Lines<'m> {
 
 /// Whether an effect is a function of positions, so that it has a value everywhere in the travel.
 fn follows_position(effect: &Effect) -> bool {
-    matches!(effect.driver, Driver::Axis(_) | Driver::None) && effect.shape.fits_position_table()
+    let of_position = matches!(effect.driver, Driver::Axis(_) | Driver::None | Driver::Gravity | Driver::GravityAt(_));
+    of_position && effect.shape.fits_position_table()
 }
 
 /// The location errors by slot that a description without effects states, mm and rad, and what they leave: those of the
