@@ -232,7 +232,7 @@ fn a_robot_is_corrected_in_its_whole_pose_and_reaches_poses() {
             let turn = (directions(&reached) - directions(&wanted)).norm();
             assert!(off <= 1e-6 && turn <= 2e-9, "row {row}: {off:e} mm, {turn:e} rad");
         } else {
-            assert!(matches!(found.state, State::NearSingular | State::NotCorrectable), "{found:?}");
+            assert!(matches!(found.state, State::NearSingular | State::NotCorrectable | State::Reduced), "{found:?}");
         }
         if row < 20 {
             let pose = Pose { point_mm: point(&wanted, tool_mm), directions: directions(&wanted) };

@@ -69,18 +69,21 @@ fn beside_each_other(angle_deg: &[f64], values: &[f64], channels: usize) -> Vec<
     let mut residual = values.to_vec();
     let mut joint: Vec<(usize, f64)> = Vec::new();
     while joint.len() < MOST_JOINT {
-        let found = separate(angle_deg, &residual, channels);
-        let others = (1..=found.len()).filter(|order| joint.iter().all(|(own, _)| own != order));
-        let Some(next) = others.max_by(|a, b| found[a - 1].total_cmp(&found[b - 1])) else { break };
-        let (gain, left) = (0.5 * found[next - 1].powi(2), mean_square(&residual));
+        let others: Vec<usize> =
+            (1..=HIGHEST_ORDER).filter(|order| joint.iter().all(|(own, _)| own != order)).collect();
+        let with = |order: usize| joint.iter().map(|(own, _)| *own).chain([order]).collect::<Vec<usize>>();
+        let tried = parallel::map(others.len(), &|k| {
+            let (amplitudes, rest) = jointly(angle_deg, values, channels, &with(others[k]))?;
+            Some((mean_square(&rest), others[k], amplitudes, rest))
+        });
+        let best = tried.into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((after, next, amplitudes, rest)) = best else { break };
         // `−ln P` of a gain in noise, over all orders.
         let price = 2.0 * (1e3 * HIGHEST_ORDER as f64).ln() * channels as f64;
-        if count as f64 * gain <= price * (left - gain).max(f64::MIN_POSITIVE) {
+        if count as f64 * (mean_square(&residual) - after) <= price * after.max(f64::MIN_POSITIVE) {
             break;
         }
-        let orders: Vec<usize> = joint.iter().map(|(own, _)| *own).chain([next]).collect();
-        let Some((amplitudes, rest)) = jointly(angle_deg, values, channels, &orders) else { break };
-        joint = orders.into_iter().zip(amplitudes).collect();
+        joint = with(next).into_iter().zip(amplitudes).collect();
         residual = rest;
     }
     let mut amplitudes = separate(angle_deg, &residual, channels);
