@@ -8,11 +8,9 @@ use std::path::PathBuf;
 use abbe::apply::correction::Correction;
 use abbe::apply::correction::stream::{self, Output, Summary};
 use abbe::files::{self, commands::CommandFile};
+use abbe::identify::model_file;
 use abbe::identify::model_file::errors::EstimatedErrors;
-use abbe::identify::model_file::{self, IdentifiedModel, ModelParameter};
 use abbe::model::pose::Aim;
-use abbe::model::session::Prior;
-use abbe::model::words::first_of;
 use clap::Args;
 
 use super::failure::Failure;
@@ -88,29 +86,11 @@ pub fn run(arguments: &CompensateArguments) -> Result<(), Failure> {
     }
     written?;
     let of_model = arguments.tool_mm.is_empty();
-    let mut warnings: Vec<String> = fitted_tool(&model).filter(|_| of_model).into_iter().collect();
+    let mut warnings: Vec<String> = present::fitted_tool(&model).filter(|_| of_model).into_iter().collect();
     warnings.extend(file.warning().map(str::to_string));
     let report = present::report(&arguments.out, &summary, correction.aim, of_model, warnings);
     arguments.output.put(&outputs, &report, &summary, &Read::files(source.stamp.iter().chain([file.stamp()])))
 }
-
-/// A warning if the tool point of the model is the target of the instrument, which no one stated and the fit placed.
-fn fitted_tool(model: &IdentifiedModel) -> Option<String> {
-    let is_of_tool = |id: &str| id.starts_with("target.") || id.starts_with("spindle_ball.");
-    let free = |own: &&ModelParameter| is_of_tool(&own.id) && own.prior == Prior::Free && !own.held;
-    let placed: Vec<String> = (model.parameters.iter().filter(free))
-        .map(|own| format!("{} by {:.1} µm", own.id, own.value * own.unit.display_per_internal))
-        .collect();
-    (!placed.is_empty()).then(|| {
-        format!(
-            "the tool point is the target of the instrument, which the fit placed ({}): --tool-mm states the point of the tool",
-            first_of(&placed, MAX_NAMED, ", ", "further coordinate")
-        )
-    })
-}
-
-/// Coordinates that the warning names.
-const MAX_NAMED: usize = 3;
 
 /// A writer that fails after Ctrl-C, so that the temporary file behind it is removed.
 struct UntilInterrupted<'w> {

@@ -11,7 +11,7 @@ use super::output;
 pub type NewFile = (String, String);
 
 /// Writes files into a folder: first into a temporary folder beside it, where `check_files` reads them and may add others.
-/// Then all are moved: a new folder in one step; into an existing one file after the other, the added ones last.
+/// Then all are moved, on one file system: a new folder in one step; into an existing one file after the other, the added ones last.
 ///
 /// A folder that is not empty is refused, unless `force` allows to replace files with these names. Other files stay.
 pub fn write(
@@ -27,7 +27,6 @@ pub fn write(
         _ => Path::new("."),
     };
     std::fs::create_dir_all(parent).map_err(fault)?;
-    // The temporary folder is on the same file system, so that renaming works.
     temporary::remove_stale(parent);
     let made = TemporaryFolder::in_folder(parent).map_err(fault)?;
     let whole = made.path().join("whole");
@@ -111,8 +110,7 @@ pub fn check(folder: &Path, force: bool) -> Result<bool, Failure> {
         return Err(Failure::Other(format!("{}: this is a file; name a folder", folder.display())));
     }
     let present = folder.is_dir();
-    let occupied = present && std::fs::read_dir(folder).map_err(|source| fault(folder, source))?.next().is_some();
-    if occupied && !force {
+    if present && !force && std::fs::read_dir(folder).map_err(|source| fault(folder, source))?.next().is_some() {
         return Err(Failure::Other(format!(
             "{}: the folder exists and is not empty; name another, or use --force to replace files with the same names",
             folder.display()

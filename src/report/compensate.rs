@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use abbe::apply::correction::stream::Summary;
+use abbe::identify::model_file::{IdentifiedModel, ModelParameter};
 use abbe::model::pose::Aim;
-use abbe::model::words::{counted, with_exponent};
+use abbe::model::session::Prior;
+use abbe::model::words::{counted, first_of, with_exponent};
 
 use super::block::Report;
 use super::number::fixed;
@@ -70,3 +72,21 @@ fn marked(summary: &Summary) -> Table {
     let rows = summary.marked.iter().map(|row| cells![row.line.to_string(), row.state, row.fault.clone()]);
     Table::new([">line", "state", ""], rows).titled("Rows that are marked")
 }
+
+/// A warning if the tool point of the model is the target of the instrument, which no one stated and the fit placed.
+pub fn fitted_tool(model: &IdentifiedModel) -> Option<String> {
+    let is_of_tool = |id: &str| id.starts_with("target.") || id.starts_with("spindle_ball.");
+    let free = |own: &&ModelParameter| is_of_tool(&own.id) && own.prior == Prior::Free && !own.held;
+    let placed: Vec<String> = (model.parameters.iter().filter(free))
+        .map(|own| format!("{} by {:.1} µm", own.id, own.value * own.unit.display_per_internal))
+        .collect();
+    (!placed.is_empty()).then(|| {
+        format!(
+            "the tool point is the target of the instrument, which the fit placed ({}): --tool-mm states the point of the tool",
+            first_of(&placed, MAX_NAMED, ", ", "further coordinate")
+        )
+    })
+}
+
+/// Coordinates that the warning names.
+const MAX_NAMED: usize = 3;

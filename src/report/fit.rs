@@ -80,7 +80,7 @@ pub fn report(
     straightness::section(&mut report, &result.straightness);
     report.section("Next");
     let steps = next(problem, result, statements.measure.step, commands);
-    let page = commands.command("fit", &format!("--report {}", commands.beside("fit.html")));
+    let page = commands.command("fit", "--report fit.html");
     report.steps(steps, (page, "write residuals, plots and sliders as a page"));
     report.section("Residuals");
     report.detail(Text::List(quality.held_out_sentences(None)));

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use abbe::apply::compare::ComparisonStatement;
 use abbe::apply::compare::results::{Comparison, Difference};
-use abbe::codegen::nc::{self, has_letters};
+use abbe::codegen::nc::has_letters;
 #[cfg(feature = "fleet")]
 use abbe::fleet::history::HistoryStatements;
 use abbe::identify::results::validation::{MovedParameter, ValidationResult, ValidationVerdict};
@@ -15,7 +15,7 @@ use abbe::identify::results::{
 use abbe::identify::tolerance::rule::Decision;
 use abbe::model::chain::Machine;
 use abbe::model::session::Session;
-use abbe::model::words::{counted, first_of, listed};
+use abbe::model::words::{counted, first_of};
 use abbe::plan::PlanStatement;
 use abbe::plan::results::{Contribution, ErrorAnalysis, PlanAnalysis};
 
@@ -142,7 +142,7 @@ fn measure(statement: &MeasureStatement, machine: Option<&Machine>, commands: &C
         sentences.push(Sentence::Command(written, words.into()));
         if has_program {
             let options = format!("--control CONTROL --out {}", commands.beside(PROGRAMS));
-            sentences.push(Sentence::Command(commands.on(NEXT, "nc", &options), its_program()));
+            sentences.push(Sentence::Command(commands.on(NEXT, "nc", &options), "its program".into()));
         }
         sentences
     };
@@ -154,7 +154,7 @@ fn measure(statement: &MeasureStatement, machine: Option<&Machine>, commands: &C
         NextStep::SeparatingTest => {
             let test = statement.description.as_deref().unwrap_or_default();
             let written = command("trace", &format!("--next {} --control CONTROL", commands.beside(MEASURE)));
-            let what = format!("writes the test, {} and its sheet", its_program());
+            let what = "writes the test, its program and its sheet".to_string();
             vec![format!("What to measure next: {test}").into(), Sentence::Command(written, what)]
         }
         NextStep::Identify => plan(IDENTIFIES),
@@ -170,11 +170,6 @@ fn measure(statement: &MeasureStatement, machine: Option<&Machine>, commands: &C
         NextStep::Repeat => one("the session once more"),
         NextStep::NextCheck => one("the next check"),
     }
-}
-
-/// The program that a proposed command writes, and the controls among which the user chooses.
-fn its_program() -> String {
-    format!("its program (CONTROL: {})", listed(&nc::CONTROLS.map(nc::Control::word), "or"))
 }
 
 /// `12.1 ± 1.9 µm`.

@@ -82,14 +82,12 @@ pub fn report(
     conformity::section(&mut report, result.conformity.as_ref());
     let by_prior = &result.outcome.determined_by_prior;
     confounded::section(&mut report, &result.unobservable, by_prior, (&result.outliers, result.reading_unit));
-    let presumed = "Location errors that rest on the absence of a motion, which no reading separates from them:";
-    report.headed(Level::Detail, presumed, Text::List(result.presumed.clone()));
     report.section("Next");
     report.headed(Level::Key, "Tests that separate an effect from its aliases:", Text::List(measure_next(result)));
     let page = "write residuals, plots and alternatives as a page";
     report.steps(
         next(result, statements.measure.step, commands),
-        (commands.command("trace", &format!("--report {}", commands.beside("trace.html"))), page),
+        (commands.command("trace", "--report trace.html"), page),
     );
     if !figures {
         return Ok(report);
@@ -203,7 +201,8 @@ fn key_figures(trace: &TraceOutcome, before: &Quality<'_>, after: &Quality<'_>) 
     match result.effects.as_slice() {
         [] => {}
         [one] if one.unique => {
-            figures.push(KeyFigure::new("Uniqueness", "unique", format!("among {}", uniqueness::screened(result))));
+            let among = format!("among {} detectable candidates", integer(result.candidates_detectable));
+            figures.push(KeyFigure::new("Uniqueness", "unique", among));
         }
         [one] => {
             let count = format!("1 of {}", one.explanation_count);

@@ -13,9 +13,7 @@ use std::collections::HashSet;
 use abbe_identify::error::IdentifyError;
 use abbe_model::effect::Shape;
 
-use super::constants::{
-    INDISTINGUISHABLE, MAX_COMPETING, MAX_PREFERRED, MIN_COSINE, MORE_PROBABLE, PAIRED, SAME_READINGS,
-};
+use super::constants::{INDISTINGUISHABLE, MAX_COMPETING, MIN_COSINE};
 use super::plausible::prior_cost;
 use super::state::{ALL, SearchState};
 use crate::candidates::gain::{Gain, TrainedModel};
@@ -32,9 +30,6 @@ pub(super) struct Alias {
     pub delta_chi2: f64,
     /// Its prior cost less that of the found effect ([`super::plausible`]).
     pub prior_cost: f64,
-    /// The candidate of which it is a variant: another shape of the same component over the same driver, whose fitted
-    /// readings are the same. `None` for an explanation of its own.
-    pub variant_of: Option<usize>,
 }
 
 impl Alias {
@@ -163,15 +158,14 @@ pub(super) fn aliases(
         })
         .map(|(candidate, gain)| (candidate, gain.gain))
         .collect();
-    // A tuned number counts as much as in the comparison above.
-    let cost = |candidate: usize| prior_cost(search.effect(candidate)) + INDISTINGUISHABLE * numbers(candidate) as f64;
+    let cost = |candidate: usize| prior_cost(search.effect(candidate));
     let mut aliases: Vec<Alias> = Vec::new();
     for (candidate, gain) in near {
         let cosine = model.explained_by_signature(candidate, selected.candidate, &signature)?.sqrt();
         if cosine >= MIN_COSINE {
             let delta_chi2 = (of_named.gain - gain) / variance;
             let prior_cost = cost(candidate) - cost(selected.candidate);
-            aliases.push(Alias { candidate, cosine, delta_chi2, prior_cost, variant_of: None });
+            aliases.push(Alias { candidate, cosine, delta_chi2, prior_cost });
         }
     }
     aliases.sort_by(|a, b| {
@@ -185,104 +179,6 @@ pub(super) fn aliases(
     let named = search.effect(selected.candidate).id();
     let mut ids = HashSet::from([named]);
     aliases.retain(|alias| ids.insert(search.effect(alias.candidate).id()));
-    mark_variants(search, selected.candidate, model, variance, &mut aliases)?;
     let competing_effects = competing_effects(search, k, &gains, variance, &aliases);
     Ok((aliases, competing_effects))
-}
-
-/// Marks the aliases that are variants of the found effect, or of an alias before them. Of one explanation the simplest
-/// shape has the name.
-fn mark_variants(
-    search: &SearchState<'_>,
-    found: usize,
-    model: &TrainedModel<'_>,
-    variance: f64,
-    aliases: &mut [Alias],
-) -> Result<(), IdentifyError> {
-    let same = SAME_READINGS.powi(2) * variance * search.columns.rows() as f64;
-    let is_variant = |one: usize, other: usize| -> Result<bool, IdentifyError> {
-        let [a, b] = [one, other].map(|candidate| search.effect(candidate));
-        let alike = a.component == b.component && a.driver == b.driver && a.tests == b.tests;
-        Ok(alike && model.difference_square([one, other])? < same)
-    };
-    let mut order: Vec<usize> = (0..aliases.len()).collect();
-    order.sort_by_key(|place| search.gram.numbers(aliases[*place].candidate));
-    let mut heads = vec![found];
-    for place in order {
-        let own = aliases[place].candidate;
-        for head in &heads {
-            if is_variant(own, *head)? {
-                aliases[place].variant_of = Some(*head);
-                break;
-            }
-        }
-        if aliases[place].variant_of.is_none() {
-            heads.push(own);
-        }
-    }
-    Ok(())
-}
-
-/// Exchanges the selected effects for more probable explanations, by likelihood and mechanical plausibility: one in place of
-/// one, then two in place of two. Returns whether one was exchanged.
-///
-/// # Errors
-/// If products are not finite.
-pub(super) fn prefer_most_probable(search: &mut SearchState<'_>, variance: f64) -> Result<bool, IdentifyError> {
-    let mut changed = false;
-    for _ in 0..MAX_PREFERRED {
-        let Some(chosen) = more_probable(search, variance)? else { break };
-        let selected = &mut search.selection.branches[ALL].selected;
-        selected.iter_mut().zip(chosen).for_each(|(own, candidate)| own.candidate = candidate);
-        search.tune_aliases()?;
-        changed = true;
-    }
-    Ok(changed)
-}
-
-/// The most probable set in place of the selected one; `None` if that is the most probable.
-fn more_probable(search: &SearchState<'_>, variance: f64) -> Result<Option<Vec<usize>>, IdentifyError> {
-    let chosen: Vec<usize> = search.selected().iter().map(|own| own.candidate).collect();
-    let mut aliases_of = Vec::with_capacity(chosen.len());
-    for k in 0..chosen.len() {
-        let aliases = aliases(search, k, &search.model_without(Some(k))?, variance)?.0;
-        let best = aliases.iter().find(|alias| alias.variant_of.is_none());
-        if let Some(best) = best.filter(|best| best.ln_probability_ratio() > MORE_PROBABLE) {
-            let mut better = chosen.clone();
-            better[k] = best.candidate;
-            return Ok(Some(better));
-        }
-        aliases_of.push(aliases);
-    }
-    let folds = search.selection.branches[ALL].folds.clone();
-    let cost = |candidate: usize| {
-        prior_cost(search.effect(candidate)) + INDISTINGUISHABLE * search.gram.numbers(candidate) as f64
-    };
-    for (k, aliases) in aliases_of.iter().enumerate().filter(|_| chosen.len() > 1) {
-        for alias in aliases.iter().filter(|alias| alias.variant_of.is_none()).take(PAIRED) {
-            for other in (0..chosen.len()).filter(|other| *other != k) {
-                let mut pair = chosen.clone();
-                pair[k] = alias.candidate;
-                let rest: Vec<usize> = (0..pair.len()).filter(|own| *own != other).map(|own| pair[own]).collect();
-                let model = search.model_of(&rest, &folds)?;
-                // With the first exchange alone the second effect loses this much; what takes its place has to win it back.
-                let before = alias.ln_probability_ratio();
-                let own = model.gain(chosen[other])?.gain;
-                let of = |(candidate, gain): (usize, &Gain)| {
-                    let increase = 0.5 * (gain.gain - own) / variance - cost(candidate) + cost(chosen[other]);
-                    (candidate, before + increase)
-                };
-                let gains = search.gains(&model)?;
-                let permitted = |(candidate, gain): &(usize, &Gain)| {
-                    gain.freedom > 0 && !pair.contains(candidate) && search.may_be_added(*candidate, &folds)
-                };
-                let best = gains.iter().enumerate().filter(permitted).map(of).max_by(|a, b| a.1.total_cmp(&b.1));
-                if let Some((candidate, _)) = best.filter(|(_, ratio)| *ratio > INDISTINGUISHABLE) {
-                    pair[other] = candidate;
-                    return Ok(Some(pair));
-                }
-            }
-        }
-    }
-    Ok(None)
 }

@@ -60,8 +60,6 @@ pub const MAX_EVIDENCE_DEFICIT: f64 = 4.0;
 pub const MAX_SCORE_DEFICIT: f64 = 4.0;
 /// Maximum number of explanations over which the prediction of a fold is averaged.
 pub const MAX_AVERAGED: usize = 13;
-/// Share of the mean pitch by which the pitches of regular steps differ at most.
-pub const REGULAR: f64 = 0.15;
 /// Numbers of intervals of the nonparametric curves that effects along one axis are compared with.
 pub const INTERVALS: [usize; 3] = [8, 16, 32];
 
@@ -69,16 +67,6 @@ pub const INTERVALS: [usize; 3] = [8, 16, 32];
 /// least half of the squared signature. The evidence alone does not suffice: a candidate may explain as much of a
 /// different structure.
 pub const MIN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
-/// Rms difference of the fitted readings, in standard deviations of the noise, below which two shapes of one component over
-/// one driver are one explanation.
-pub const SAME_READINGS: f64 = 0.1;
-/// `ln` of the probability ratio above which an alias takes the place of the selected effect: one that rounding does not
-/// make.
-pub const MORE_PROBABLE: f64 = 0.01;
-/// Aliases of one effect that are tried together with other candidates in place of a second effect.
-pub const PAIRED: usize = 8;
-/// Most exchanges for more probable effects.
-pub const MAX_PREFERRED: usize = 8;
 /// Maximum number of competing explanations of a found effect.
 pub const MAX_COMPETING: usize = 16;
 

@@ -73,19 +73,6 @@ pub(super) fn search_and_refit(
             judged = judge(search)?;
         }
     }
-    if let Some(smooth) = with_smooth_shapes(search, record, &judge)? {
-        (ended, judged) = smooth;
-    }
-    // An effect whose number has no value in these readings is no effect of its own.
-    loop {
-        let beyond = search.beyond_library(judged.estimated(search));
-        if beyond.is_empty() {
-            break;
-        }
-        search.exclude(&beyond)?;
-        ended = search_on(search, record)?;
-        judged = judge(search)?;
-    }
     if search.policy.withdraws {
         moves::on_every_branch(&Withdraw { structured: judged.is_structured() }, search)?;
         search.note_held_out()?;
@@ -95,28 +82,6 @@ pub(super) fn search_and_refit(
         }
     }
     Ok((ended, judged))
-}
-
-/// Searches once more without the staircases that were found: with enough steps they approximate any shape. A staircase stays
-/// if it predicts held-out readings better than what is found without it, by more than the standard error. Otherwise the model
-/// of the other shapes takes its place, and is returned.
-fn with_smooth_shapes(
-    search: &mut SearchState<'_>,
-    record: &mut SearchRecord<'_>,
-    judge: &impl Fn(&SearchState<'_>) -> Result<RefittedModel, IdentifyError>,
-) -> Result<Option<(f64, RefittedModel)>, IdentifyError> {
-    if search.staircases().is_empty() {
-        return Ok(None);
-    }
-    let (found, steps, strongest) = (search.clone(), std::mem::take(&mut record.steps), record.strongest.clone());
-    let staircases = search.all_staircases();
-    search.restart_without(&staircases);
-    let ended = search_on(search, record)?;
-    if found.predicts_better_than(&search.selection) {
-        (*search, record.steps, record.strongest) = (found, steps, strongest);
-        return Ok(None);
-    }
-    Ok(Some((ended, judge(search)?)))
 }
 
 /// Runs rounds until no candidate is significant, or until additions do not lower the held-out error. The accepted

@@ -32,7 +32,6 @@ use crate::noise::{NoiseSource, PureError, ShownNoise};
 use crate::numerics::least_squares::{LeastSquares, Scaling, minimise};
 use crate::numerics::rank::Rank;
 use crate::numerics::tails::residual_tail;
-use crate::numerics::tolerances::MIN_IDENTIFIABLE;
 use crate::numerics::triangle::Triangle;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
@@ -155,7 +154,8 @@ const LINEAR: f64 = 1e-5;
 /// # Errors
 /// If the model cannot be evaluated, or the iterations do not converge.
 pub fn minimum(problem: &Problem, start: Option<&[f64]>) -> Result<Minimum, IdentifyError> {
-    let mut found = minimum_at_nominal(problem, start)?;
+    let (rank, linearised) = rank_at_nominal(problem)?;
+    let mut found = minimum_of_rank(problem, rank, linearised, start)?;
     let has_families = !families::families(&problem.parameters).is_empty();
     for _ in 0..MAX_RANKS {
         let is_full = found.rank.null_space.ncols() == 0;
@@ -185,29 +185,6 @@ pub fn minimum(problem: &Problem, start: Option<&[f64]>) -> Result<Minimum, Iden
         found = further;
     }
     Ok(found)
-}
-
-/// Factor by which the least singular value of an identifiable direction grows where the iterations do not converge, and its
-/// largest value.
-const LEAST_STEP: f64 = 3.0;
-const MAX_LEAST: f64 = 30.0;
-
-/// The minimum in the directions that are identifiable at the nominal machine. Along a direction that the readings hardly
-/// determine, the iterations may follow a curved valley over many times the size of an error: it is weak, and is held too.
-fn minimum_at_nominal(problem: &Problem, start: Option<&[f64]>) -> Result<Minimum, IdentifyError> {
-    let mut least = MIN_IDENTIFIABLE;
-    let mut failed = None;
-    loop {
-        let (rank, linearised) = rank_at_nominal(problem, least)?;
-        match minimum_of_rank(problem, rank, linearised, start) {
-            Err(error @ IdentifyError::NoConvergence { .. }) if least < MAX_LEAST => {
-                failed.get_or_insert(error);
-                least *= LEAST_STEP;
-            }
-            Err(error @ IdentifyError::NoConvergence { .. }) => return Err(failed.unwrap_or(error)),
-            found => return found,
-        }
-    }
 }
 
 /// The same in the identifiable directions of a rank. `linearised` are parameters and their triangular factors.
@@ -264,22 +241,20 @@ fn named(problem: &Problem, rank: &Rank, error: IdentifyError) -> IdentifyError 
     IdentifyError::NoConvergence { iterations, sum_of_squares, step, along }
 }
 
-/// Degrees of freedom of χ². Each prior counts as an observation, each estimated position of a step as a
-/// parameter.
+/// Degrees of freedom of χ². Each prior counts as an observation.
 fn freedom(problem: &Problem, rank: &Rank) -> usize {
-    let estimated = rank.identifiable_basis.ncols() + problem.parameters.positions().count();
-    (problem.scalars() + problem.prior_rows()).saturating_sub(estimated)
+    (problem.scalars() + problem.prior_rows()).saturating_sub(rank.identifiable_basis.ncols())
 }
 
 /// The rank at the nominal machine, and the parameters and triangular factors of its linearisation. The priors of
 /// families determine their coefficients, so the rank is that of the other parameters, and their linearisation is not
-/// computed: there may be hundreds of them. `least` is the least singular value of an identifiable direction.
-fn rank_at_nominal(problem: &Problem, least: f64) -> Result<(Rank, (Vec<f64>, Vec<Triangle>)), IdentifyError> {
+/// computed: there may be hundreds of them.
+fn rank_at_nominal(problem: &Problem) -> Result<(Rank, (Vec<f64>, Vec<Triangle>)), IdentifyError> {
     let decided = |problem: &Problem| {
         let nominal = vec![0.0; problem.parameters.list.len()];
         let triangles = problem.triangles(&nominal)?;
         let whole = problem.prior_triangle(&nominal).merged(&triangles);
-        let rank = problem.parameters.rank_above(&whole, (least, 0))?;
+        let rank = problem.parameters.rank(&whole)?;
         Ok::<_, IdentifyError>((rank, (nominal, triangles)))
     };
     if families::families(&problem.parameters).is_empty() {
@@ -297,7 +272,7 @@ fn rank_at_nominal(problem: &Problem, least: f64) -> Result<(Rank, (Vec<f64>, Ve
 
 /// The parameters with each combination that is not identifiable at its nominal value.
 fn identifiable(problem: &Problem, beta: &[f64]) -> Result<Vec<f64>, IdentifyError> {
-    let (rank, _) = rank_at_nominal(problem, MIN_IDENTIFIABLE)?;
+    let (rank, _) = rank_at_nominal(problem)?;
     Ok(rank.parameters_at(&rank.coordinates(beta, &problem.parameters.sizes())))
 }
 

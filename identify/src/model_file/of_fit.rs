@@ -34,6 +34,9 @@ impl IdentifiedModel {
             size: parameter.size,
         });
         let null_directions = base.null_space.col_iter();
+        // Values of the set-up count from the stated points.
+        let of_first = problem.session.tests.iter().find(|test| test.name == problem.tests[0].name);
+        let stated = of_first.map_or(problem.models[0].station(), |test| &test.station);
         Ok(IdentifiedModel {
             machine: problem.session.machine.as_ref().clone(),
             instrument: problem.session.instrument,
@@ -54,8 +57,8 @@ impl IdentifiedModel {
             },
             ranges: range::of_problem(problem, &problem.parameters.effects),
             motion_ranges: motion::of_problem(problem),
-            tool_mm: problem.models[0].station().tool_point_mm(),
-            table_mm: problem.models[0].station().table_point_mm().unwrap_or_default(),
+            tool_mm: stated.tool_point_mm(),
+            table_mm: stated.table_point_mm().unwrap_or_default(),
             reference: Reference::without_history(problem.reference.time_s, problem.reference.means.clone()),
             provenance,
         })

@@ -57,18 +57,18 @@ pub struct LeastSquaresSolution {
     pub iterations: usize,
 }
 
-const MAX_ITERATIONS: usize = 200;
+const MAX_ITERATIONS: usize = 1000;
 /// Attempts to find a damping with which a step lowers the sum of squares.
 const MAX_ATTEMPTS: usize = 30;
-/// Predicted decrease of the sum of squares, as a share of its mean, at which the iterations end: a millionth of a standard
-/// uncertainty. One more step follows.
-const CONVERGED: f64 = 1e-12;
+/// Predicted decrease of the sum of squares, as a share of its mean, at which the iterations end: 10⁻¹⁰ standard
+/// uncertainties. One more step follows.
+const CONVERGED: f64 = 1e-20;
 /// The same for steps that do not end within [`MAX_ITERATIONS`]: a hundredth of a standard uncertainty.
 const NEGLIGIBLE: f64 = 1e-4;
 /// Decrease of the sum of squares, as a share of it, that is below the rounding of the sum.
 const ROUNDING_OF_SUM: f64 = 1e-12;
 /// Full steps of such a decrease go on as long as each predicts at most this share of the one before.
-const SHRINKING: f64 = 0.25;
+const SHRINKING: f64 = 0.9;
 /// Relative step that is below the rounding of the readings.
 const ROUNDING_OF_STEP: f64 = 1e-9;
 /// Gain ratio below which the damping grows, and the one above which it falls.

@@ -17,7 +17,7 @@
 //! The null space is reported in reduced row echelon form (`null_space`), in an order of preference of the
 //! parameters that follows from their identifiers.
 
-use faer::{Mat, MatRef};
+use faer::Mat;
 
 use super::null_space::{MIN_PIVOT, combinations};
 use super::solve::Svd;
@@ -41,8 +41,10 @@ pub struct Rank {
     /// Of each row that is weak, the standard uncertainty along it, in physical sizes of its pivot: it changes readings, by
     /// less than their noise. `None` of a structural one, which changes no reading.
     pub weak_u: Vec<Option<f64>>,
-    /// Orthonormal basis of the null space, in scaled parameters: parameters × (parameters − rank).
+    /// Orthonormal basis of the null space, in scaled parameters: parameters × (parameters − rank), the weak directions first.
     pub null_space: Mat<f64>,
+    /// Number of directions of the null space that change no reading: its last columns.
+    pub structural: usize,
 }
 
 impl Rank {
@@ -73,20 +75,13 @@ impl Rank {
         let rank = directions.rank_above(least).max(at_least).min(numerical);
         let v = directions.right();
         let null_space = v.subcols(rank, n - rank).to_owned();
-        let combinations = |space: MatRef<'_, f64>| combinations(space, scaled.as_ref(), preference, MIN_PIVOT);
-        let (mut null_combinations, mut pivots) = combinations(v.subcols(numerical, n - numerical));
-        let mut weak_u = vec![None; pivots.len()];
-        if numerical > rank {
-            let weak_space = without_pivots(v.subcols(rank, numerical - rank), &null_combinations, &pivots)?;
-            let (more, of_more) = combinations(weak_space.as_ref());
-            let signal = |row: &[f64]| {
-                let along = |i: usize| row.iter().enumerate().map(|(j, share)| scaled[(i, j)] * share).sum::<f64>();
-                (0..n).map(|i| along(i).powi(2)).sum::<f64>().sqrt()
-            };
-            weak_u.extend(more.iter().map(|row| Some(1.0 / signal(row).max(f64::MIN_POSITIVE))));
-            null_combinations.extend(more);
-            pivots.extend(of_more);
-        }
+        let (null_combinations, pivots) = combinations(null_space.as_ref(), scaled.as_ref(), preference, MIN_PIVOT);
+        let signal = |row: &Vec<f64>| {
+            let along = |i: usize| row.iter().enumerate().map(|(j, share)| scaled[(i, j)] * share).sum::<f64>();
+            (0..n).map(|i| along(i).powi(2)).sum::<f64>().sqrt()
+        };
+        let weak_u = null_combinations.iter().map(signal).map(|signal| (signal > MIN_SIGNAL).then(|| 1.0 / signal));
+        let weak_u = weak_u.collect();
         // At full rank the basis is that of the parameters themselves.
         let identifiable_basis = if rank == n {
             Mat::from_fn(n, n, |i, j| if i == j { size[i] } else { 0.0 })
@@ -94,7 +89,15 @@ impl Rank {
             Mat::from_fn(n, rank, |i, k| v[(i, k)] * size[i])
         };
         let singular_values = directions.singular_values;
-        Ok(Rank { singular_values, identifiable_basis, null_combinations, pivots, weak_u, null_space })
+        Ok(Rank {
+            singular_values,
+            identifiable_basis,
+            null_combinations,
+            pivots,
+            weak_u,
+            null_space,
+            structural: n - numerical,
+        })
     }
 
     /// The same with the gauge of a set-up: along structural null directions the parameters of the set-up change, the others
@@ -103,7 +106,7 @@ impl Rank {
     /// # Errors
     /// If the null space has entries that are not finite.
     pub fn with_set_up_first(mut self, is_set_up: &[bool], size: &[f64]) -> Result<Rank, IdentifyError> {
-        let structural = self.weak_u.iter().filter(|weak| weak.is_none()).count();
+        let structural = self.structural;
         let n = size.len();
         let others: Vec<usize> = (0..n).filter(|j| !is_set_up[*j]).collect();
         if structural == 0 || others.len() == n {
@@ -153,6 +156,7 @@ impl Rank {
             null_combinations: self.null_combinations.iter().map(wide).collect(),
             pivots: self.pivots.iter().map(|pivot| kept[*pivot]).collect(),
             weak_u: self.weak_u.clone(),
+            structural: self.structural,
             null_space,
         }
     }
@@ -184,22 +188,12 @@ impl Rank {
     }
 }
 
+/// Signal of a combination, in standard deviations per physical size of its pivot, above which it is weak: rounding and what
+/// is pruned from a structural one are less.
+const MIN_SIGNAL: f64 = 1e-3;
 /// Share of the other parameters in a null direction below which it is one of the set-up alone: taking a change of one
 /// physical size out of the others would move the set-up by a hundred.
 const MIN_SHARE_OF_MACHINE: f64 = 0.01;
-
-/// An orthonormal basis of the space that combinations of `space` and of `rows` span, as far as it is zero at the pivots of
-/// `rows`. `rows` are in reduced row echelon form.
-fn without_pivots(space: MatRef<'_, f64>, rows: &[Vec<f64>], pivots: &[usize]) -> Result<Mat<f64>, IdentifyError> {
-    if rows.is_empty() {
-        return Ok(space.to_owned());
-    }
-    let reduced = Mat::from_fn(space.nrows(), space.ncols(), |j, k| {
-        let along = rows.iter().zip(pivots).map(|(row, pivot)| row[j] * space[(*pivot, k)]).sum::<f64>();
-        space[(j, k)] - along
-    });
-    Ok(Svd::of(reduced.as_ref())?.left().to_owned())
-}
 
 #[cfg(test)]
 mod tests {

@@ -163,13 +163,10 @@ pub struct AliasResult {
     /// Likelihood with the alias over likelihood with the found effect: exp(−`delta_chi2`/2).
     pub likelihood_ratio: f64,
     /// Prior cost of the alias less that of the found effect, −ln of a probability: how much less plausible it is
-    /// mechanically, and 2 for each further number of its shape.
+    /// mechanically.
     pub prior_cost: f64,
     /// Probability of the alias over that of the found effect: `likelihood_ratio` · exp(−`prior_cost`).
     pub probability_ratio: f64,
-    /// Other shapes of the same component over the same driver, with the same fitted readings.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub variants: Vec<EffectName>,
 }
 
 /// An effect that the search has found.
@@ -208,11 +205,7 @@ pub struct EffectResult {
     pub heldout_rms_um: f64,
     /// Whether the effect is unique: no other effect of the library explains the readings equally well in its place.
     pub unique: bool,
-    /// Other shapes of the same component over the same driver, with the same fitted readings: variants of this explanation.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub variants: Vec<EffectName>,
-    /// Number of explanations that the readings do not separate, this effect included; 1 where it is unique. Variants count
-    /// once.
+    /// Number of explanations that the readings do not separate, this effect included; 1 where it is unique.
     pub explanation_count: usize,
     /// All of these explanations in words, by part of the machine:
     /// `C table: axial motion twice per turn, or tilt about X once per turn`.
@@ -374,12 +367,6 @@ pub struct TraceResult {
     pub candidates: usize,
     /// Number of candidates that these readings can detect.
     pub candidates_detectable: usize,
-    /// The families of effects of these candidates: what is unique is unique among them.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub families: Vec<String>,
-    /// What location errors of rotary axes rest on: motions of their axes that the readings do not separate from them.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub presumed: Vec<String>,
     /// The null-space directions of the model with the found effects, in words.
     pub unobservable: Vec<Unobservable>,
     /// The null space of the model with the found effects, as a matrix.

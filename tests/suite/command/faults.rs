@@ -190,10 +190,7 @@ fn a_full_disk_names_the_folder_of_the_next_measurement() {
     let place = TestFolder::new();
     let session = crate::suite::ready("hermle-c600u/measured/session.toml");
     let before = place.names();
-    let line = format!(
-        "ulimit -f 16; exec abbe trace {} --only EZC~C:h --next next --control linuxcnc --quiet",
-        text(&session)
-    );
+    let line = format!("ulimit -f 16; exec abbe trace {} --next next --control linuxcnc --quiet", text(&session));
     let output = place.shell(&line);
     refused(&output, &["next/", "cannot be written", "File too large"]);
     assert!(!String::from_utf8_lossy(&output.stderr).contains(".abbe-"), "{}", String::from_utf8_lossy(&output.stderr));

@@ -245,7 +245,8 @@ fn any_start_gives_the_same_fit() {
                         println!("{kind:?} {number} {seed} {off_mm}: refused");
                         continue;
                     };
-                    assert!(found.chi_square / (found.degrees_of_freedom as f64) < 1.4, "{kind:?} {number} {off_mm}");
+                    let ratio = found.chi_square / found.degrees_of_freedom as f64;
+                    assert!(ratio < 1.4, "{kind:?} {number} {off_mm}: {ratio}");
                     assert!(accepted(&found.plausibility).is_ok());
                     let Some(right) = &right else {
                         right = Some(found);

@@ -29,8 +29,6 @@ pub(crate) struct Candidate {
     pub tuned_on: Vec<usize>,
     /// Whether the readings would show it at its largest plausible size.
     pub detectable: bool,
-    /// Whether the search has excluded it.
-    pub forbidden: bool,
 }
 
 impl Candidate {
@@ -48,7 +46,6 @@ impl Candidate {
             grid,
             tuned_on: Vec::new(),
             detectable: true,
-            forbidden: false,
         }
     }
 

@@ -14,24 +14,17 @@ use abbe_identify::fit::{self, Fit, prepare_with};
 use abbe_identify::heldout::cross_validation;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{ChangedParameter, EffectResult, ModelResult, OfAngles, ParameterResult, TraceResult};
-use abbe_model::component::{ErrorKind, ErrorName};
-use abbe_model::effect::description::meaning;
-use abbe_model::effect::{Component, Effect, Shape};
-use abbe_model::words::listed;
+use abbe_model::effect::Effect;
 
 use super::alias::{self, Alias, CompetingEffect};
 use super::remainder::Structure;
-use super::state::{ALL, SearchState};
-use crate::candidates::gain::Projected;
+use super::state::SearchState;
 use crate::candidates::library;
 pub(super) use build::unsearched;
-use build::{Model, Searched, Statements, build};
+use build::{Model, Statements, build};
 pub use effect::effect_name;
 pub(super) use poses::{PosesEnded, outcome_of_poses};
 use verdict::verdict;
-
-/// Share of a signal that remains beside the declared model below which the model contains it.
-const CONTAINED: f64 = 0.01;
 
 /// The end state of a search.
 pub(super) struct TraceFindings<'f> {
@@ -77,8 +70,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
     let mut chosen_candidates = Vec::new();
     let mut predicted = Vec::new();
     let mut costs = Vec::new();
-    let (mut covered, mut variants) = (Vec::new(), Vec::new());
-    let variance = residual_variance(search, before, findings.after_fit);
+    let variance = residual_variance(findings);
     for (k, taken) in search.selected().iter().enumerate() {
         let model = search.model_without(Some(k))?;
         let (mut aliases, of_effect) = alias::aliases(search, k, &model, variance)?;
@@ -89,25 +81,14 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
             // The left-out tests were predicted with the other effect in the model.
             of_tests = prediction::Predictions::none(&aliases);
         }
-        let found = chosen.unwrap_or(taken.candidate);
-        chosen_candidates.push((found, chosen.is_some()));
-        let effect_of = |alias: &Alias| search.effect(alias.candidate).clone();
-        // Uncertainties cover variants too.
-        covered.push(aliases.iter().map(effect_of).collect::<Vec<Effect>>());
-        let own = |alias: &Alias| alias.variant_of.is_none();
-        of_tests.keep(|place| own(&aliases[place]));
         predicted.push(of_tests);
-        let heads: Vec<&Alias> = aliases.iter().filter(|alias| own(alias)).collect();
-        alias_effects.push(heads.iter().map(|alias| effect_of(alias)).collect());
-        costs.push(heads.iter().map(|alias| [alias.delta_chi2, alias.prior_cost]).collect::<Vec<_>>());
-        let variants_of = |head: usize| -> Vec<Effect> {
-            aliases.iter().filter(|alias| alias.variant_of == Some(head)).map(effect_of).collect()
-        };
-        let each = std::iter::once(found).chain(heads.iter().map(|alias| alias.candidate));
-        variants.push(each.map(variants_of).collect::<Vec<_>>());
+        chosen_candidates.push((chosen.unwrap_or(taken.candidate), chosen.is_some()));
+        let effect_of = |alias: &Alias| search.effect(alias.candidate).clone();
+        alias_effects.push(aliases.iter().map(effect_of).collect());
+        costs.push(aliases.iter().map(|alias| [alias.delta_chi2, alias.prior_cost]).collect::<Vec<_>>());
         gains.push(model.gain(taken.candidate)?.gain);
     }
-    let (after, after_fit) = with_aliases(findings, &chosen_candidates, &covered)?;
+    let (after, after_fit) = with_aliases(findings, &chosen_candidates, &alias_effects)?;
     let (after, after_fit) = (&after, &after_fit);
     let after_result = model_result(after, after_fit, held_out.last_um() * 1e-3)?;
     let (verdict, remainder) = verdict(findings, !search.selected().is_empty());
@@ -123,7 +104,6 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
                 rms_gain_um: (gains[k] / held_out.rows).sqrt() * before.noise.sigma_mm * 1e3,
                 alias_effects: &alias_effects[k],
                 costs: &costs[k],
-                variants: &variants[k],
                 predicted: &predicted[k],
             };
             effect::result(findings, &families, &held_out, &reported)
@@ -138,7 +118,6 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
         residual_before: residual_before(before, findings.structure_before, !search.selected().is_empty()),
         rejected: rejected::candidates(&before.session.machine, search, &held_out),
         candidates: [findings.candidates, findings.candidates_seen],
-        searched: Searched { families: searched_families(search, &families), presumed: presumed(search, before)? },
         interrupted: findings.interrupted,
         warnings,
     };
@@ -147,43 +126,6 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
     let result = build(declared, found, statements, effects)?;
     let (after, after_fit) = (after.clone(), after_fit.clone());
     Ok(ReportedEffect { after, after_fit, result, alias_effects, competing_effects })
-}
-
-/// The families of the detectable candidates of a search.
-fn searched_families(search: &SearchState<'_>, families: &[library::Family]) -> Vec<String> {
-    let has_members = |number: usize| search.candidates.iter().any(|own| own.family == number && own.detectable);
-    families.iter().enumerate().filter(|(number, _)| has_members(*number)).map(|(_, own)| own.name.clone()).collect()
-}
-
-/// The precessions of rotary axes that the declared model contains, with the location errors that rest on their absence: a
-/// forward precession of order 2 reads as a constant tilt.
-fn presumed(search: &SearchState<'_>, before: &Problem) -> Result<Vec<String>, IdentifyError> {
-    let machine = &before.session.machine;
-    let list = &before.parameters.list;
-    let declared = search.model_of(&[], &search.selection.branches[ALL].folds)?;
-    let mut found = Vec::new();
-    for (number, candidate) in search.candidates.iter().enumerate().filter(|(_, own)| own.tuned_on.is_empty()) {
-        let effect = &candidate.effect;
-        let (Shape::Precession(_), Component::Axis(name)) = (&effect.shape, &effect.component) else { continue };
-        let Projected { d, own, .. } = declared.projected(number)?;
-        let has_signal = (0..own.nrows()).all(|k| own[(k, k)] > 1.0);
-        if !has_signal || (0..d.nrows()).any(|k| d[(k, k)] > CONTAINED * own[(k, k)]) {
-            continue;
-        }
-        let is_of_axis = |id: &str| {
-            ErrorName::parse(id).is_some_and(|error| {
-                error.kind == ErrorKind::Location
-                    && error.axis == name.axis
-                    && error.freedom.is_angle() == name.freedom.is_angle()
-            })
-        };
-        let errors: Vec<&str> = list.iter().map(|own| own.id.as_str()).filter(|id| is_of_axis(id)).collect();
-        if !errors.is_empty() {
-            let motion = meaning(machine, effect);
-            found.push(format!("{} presume that there is none of this: {motion}", listed(&errors, "and")));
-        }
-    }
-    Ok(found)
 }
 
 /// The structure of the residual of the declared model, in words.
@@ -231,12 +173,12 @@ impl<'s> HeldOut<'s> {
 
 /// Variance for the comparison of aliases, relative to that of the noise. For poses it is that of the remaining
 /// residual.
-pub(super) fn residual_variance(search: &SearchState<'_>, before: &Problem, after_fit: &Fit) -> f64 {
-    if !search.policy.in_residual_variance {
+fn residual_variance(findings: &TraceFindings<'_>) -> f64 {
+    if !findings.search.policy.in_residual_variance {
         return 1.0;
     }
     // The evidence uses the noise of the search.
-    relative_variance(&after_fit.residuals, before.noise.sigma_mm, search.columns.rows())
+    relative_variance(&findings.after_fit.residuals, findings.before.noise.sigma_mm, findings.search.columns.rows())
 }
 
 /// Variance of residuals, by test, mm, over that of the noise; at least 1. `rows` is the number of residuals that count.

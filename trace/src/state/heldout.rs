@@ -334,21 +334,6 @@ impl SearchState<'_> {
         self.unwhitened.units.decrease(before, &after.held_out, &after.of_all)
     }
 
-    /// Whether the selected effects predict held-out readings better than another selection, by more than the standard error
-    /// of the decrease.
-    pub fn predicts_better_than(&self, other: &Selection) -> bool {
-        self.decrease_since(other).is_significant()
-    }
-
-    /// Starts anew from the declared model, without some candidates, by identifier.
-    pub fn restart_without(&mut self, ids: &[String]) {
-        self.forbid(ids);
-        self.selection = self.declared.clone();
-        self.accepted = self.declared.clone();
-        self.thresholds.clear();
-        self.rejected.clear();
-    }
-
     /// Whether nothing is selected, or the held-out error is below that of the declared model by more than the standard
     /// error of the decrease.
     fn lowers_heldout_error(&self) -> bool {
@@ -381,11 +366,6 @@ impl SearchState<'_> {
             self.accepted = self.declared.clone();
             self.withdraw_rejected();
         }
-        self.accept_as_selected();
-    }
-
-    /// Accepts what is selected.
-    pub(super) fn accept_as_selected(&mut self) {
         self.accepted = self.selection.clone();
     }
 }

@@ -6,25 +6,14 @@ use std::sync::Arc;
 use abbe_identify::error::IdentifyError;
 use abbe_identify::numerics::parallel;
 use abbe_model::driver::Driver;
-use abbe_model::effect::{Component, Effect, Shape};
+use abbe_model::effect::Component;
 
 use super::SearchState;
 use super::tuning::Tuned;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::gain::TrainedModel;
 use crate::candidates::step_table::{StepTable, best_step_table};
-use crate::constants::{MIN_PLAUSIBLE_SIGMA, REGULAR};
-
-/// The range of each shape number over the members of a library, by identifier.
-pub(super) fn number_ranges(library: &[Candidate]) -> HashMap<String, Vec<[f64; 2]>> {
-    let mut ranges: HashMap<String, Vec<[f64; 2]>> = HashMap::new();
-    for member in library {
-        let own = member.brackets();
-        let all = ranges.entry(member.effect.id()).or_insert_with(|| own.clone());
-        all.iter_mut().zip(own).for_each(|(all, [low, high])| *all = [all[0].min(low), all[1].max(high)]);
-    }
-    ranges
-}
+use crate::constants::MIN_PLAUSIBLE_SIGMA;
 
 impl SearchState<'_> {
     /// Judges for each candidate whether it is detectable at its largest plausible size.
@@ -48,12 +37,9 @@ impl SearchState<'_> {
 
     /// Whether a branch with some training folds may add a candidate now.
     pub fn may_be_added(&self, candidate: usize, folds: &[usize]) -> bool {
-        let Candidate { detectable, forbidden, dictionary, last_resort, .. } = *self.candidates[candidate];
-        let possible = !forbidden
-            && detectable
-            && !dictionary
-            && (!last_resort || self.last_resort)
-            && self.may_be_used(candidate, folds);
+        let Candidate { detectable, dictionary, last_resort, .. } = *self.candidates[candidate];
+        let possible =
+            detectable && !dictionary && (!last_resort || self.last_resort) && self.may_be_used(candidate, folds);
         possible && (self.passed_over.is_empty() || !self.passed_over.contains(&self.kind(candidate)))
     }
 
@@ -110,75 +96,14 @@ impl SearchState<'_> {
         chosen.into_iter().partition(|candidate| self.effect(*candidate).driver == *driver)
     }
 
-    /// The selected waves of a branch with periods.
-    pub fn waves(&self, branch: usize) -> Vec<usize> {
-        let chosen = self.selection.branches[branch].chosen();
-        chosen.into_iter().filter(|candidate| matches!(self.effect(*candidate).shape, Shape::Periodic(_))).collect()
-    }
-
-    /// The effects whose estimated shape numbers have left the range of the library's members: the readings give the number
-    /// no value, as of a spike that decays before the next reading. `found` are the selected effects as estimated.
-    pub fn beyond_library(&self, found: &[Effect]) -> Vec<String> {
-        let is_beyond = |effect: &Effect| {
-            let ranges = self.number_ranges.get(&effect.id());
-            let outside =
-                |(which, [low, high]): (usize, &[f64; 2])| !(*low..=*high).contains(&effect.shape.number(which));
-            ranges.is_some_and(|ranges| ranges.iter().enumerate().any(outside))
-        };
-        found.iter().filter(|effect| is_beyond(effect)).map(Effect::id).collect()
-    }
-
-    /// Searches some candidates no more, by identifier.
-    pub(super) fn forbid(&mut self, ids: &[String]) {
-        for candidate in self.candidates.iter_mut().filter(|own| ids.contains(&own.effect.id())) {
-            Arc::make_mut(candidate).forbidden = true;
-        }
-    }
-
-    /// The identifiers of the selected staircases whose steps do not come at a regular pitch, as those of a compensation table
-    /// do.
-    pub fn staircases(&self) -> Vec<String> {
-        let irregular = |effect: &Effect| {
-            let positions = effect.shape.positions();
-            let pitches: Vec<f64> = positions.windows(2).map(|pair| pair[1] - pair[0]).collect();
-            let mean = pitches.iter().sum::<f64>() / pitches.len() as f64;
-            let is_regular = pitches.len() > 1 && pitches.iter().all(|own| (own - mean).abs() < REGULAR * mean);
-            !pitches.is_empty() && !is_regular
-        };
-        let selected = self.selected().iter().map(|selected| self.effect(selected.candidate));
-        selected.filter(|effect| irregular(effect)).map(Effect::id).collect()
-    }
-
-    /// The identifiers of all staircases that the search can form.
-    pub fn all_staircases(&self) -> Vec<String> {
-        let has_positions = |own: &&Arc<Candidate>| own.dictionary && !own.effect.shape.positions().is_empty();
-        self.candidates.iter().filter(has_positions).map(|own| own.effect.id()).collect()
-    }
-
-    /// Removes effects from every branch, by identifier, and searches them no more.
-    ///
-    /// # Errors
-    /// If products are not finite.
-    pub fn exclude(&mut self, ids: &[String]) -> Result<(), IdentifyError> {
-        self.forbid(ids);
-        let candidates = &self.candidates;
-        for branch in &mut self.selection.branches {
-            branch.selected.retain(|selected| !ids.contains(&candidates[selected.candidate].effect.id()));
-        }
-        self.note_held_out()?;
-        self.accept_as_selected();
-        Ok(())
-    }
-
     /// The step tables from the library's dictionaries for addition to a model.
     ///
     /// # Errors
     /// If products are not finite.
     pub fn step_tables(&self, model: &TrainedModel<'_>) -> Result<Vec<StepTable>, IdentifyError> {
         let variance = self.variance(model);
-        let dictionaries: Vec<usize> = (0..self.candidates.len())
-            .filter(|own| self.candidates[*own].dictionary && !self.candidates[*own].forbidden)
-            .collect();
+        let dictionaries: Vec<usize> =
+            (0..self.candidates.len()).filter(|candidate| self.candidates[*candidate].dictionary).collect();
         let best = |k: usize| best_step_table(model, dictionaries[k], &self.candidates[dictionaries[k]], variance);
         let tables: Vec<Option<StepTable>> =
             parallel::map(dictionaries.len(), &best).into_iter().collect::<Result<_, IdentifyError>>()?;

@@ -235,44 +235,42 @@ fn mistakes_are_named_and_refused() {
     check("left-handed", HEADER, &|cells: &mut Vec<f64>| cells.swap(6, 7), "left-handed");
 }
 
+/// The third axis 60 mm beside its place, where its links are 612 and 572.3 mm long: no other reading of the file explains
+/// it, so that it is a warning.
 #[test]
-fn a_location_error_above_five_per_cent_of_the_link_is_refused_unless_it_is_allowed() {
+fn an_axis_far_beside_its_place_is_a_warning_without_a_cause() {
     let place = tempfile::tempdir().unwrap();
     let machine = place.path().join("machine.toml");
     let own = std::fs::read_to_string(ready("ur10/machine.toml")).unwrap();
-    // The third axis 60 mm beside its place, where its links are 612 and 572.3 mm long.
     let moved = own.replacen("[-612, 0, 127.3]", "[-552, 0, 127.3]", 1);
     assert_ne!(moved, own);
     std::fs::write(&machine, moved).unwrap();
     let out = place.path().join("out");
     let file = foreign("units-line.txt");
-    let asked = ["import", text(&file), "--machine", text(&machine), "--out", text(&out)];
-    let output = abbe(&asked);
+    let output = abbe(&["import", text(&file), "--machine", text(&machine), "--out", text(&out)]);
     let found = message(&output).split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(!output.status.success() && !out.exists(), "{found}");
-    assert!(found.contains("0J3 is") && found.contains("% of the link"), "{found}");
-    assert!(found.contains("--allow-implausible"), "{found}");
-    let output = abbe(&[&asked[..], &["--allow-implausible"]].concat());
-    assert!(output.status.success() && out.join("session.toml").exists(), "{}", message(&output));
+    assert!(output.status.success() && out.join("session.toml").exists(), "{found}");
+    assert!(found.contains("beside its place") && found.contains("% of the link"), "{found}");
 }
 
-/// Metres that are declared as millimetres do not pass a fit.
+/// A joint that turns in the other sense does not pass a fit or a trace, which name it.
 #[test]
-fn a_fit_refuses_location_errors_that_mean_nothing() {
+fn a_fit_refuses_location_errors_that_have_a_cause() {
     let place = tempfile::tempdir().unwrap();
     let (output, session) = import(place.path(), &foreign("units-line.txt"), None, &[]);
     assert!(output.status.success(), "{}", message(&output));
     let machine = session.with_file_name("machine.toml");
     let own = std::fs::read_to_string(&machine).unwrap();
-    std::fs::write(&machine, own.replacen("[-612, 0, 127.3]", "[-552, 0, 127.3]", 1)).unwrap();
+    let (before, of_j4) = own.split_at(own.find("[axis.J4]").unwrap());
+    let reversed = format!("{before}{}", of_j4.replacen("[0, -1, 0]", "[0, 1, 0]", 1));
+    assert_ne!(reversed, own);
+    std::fs::write(&machine, reversed).unwrap();
     let text_of = std::fs::read_to_string(&session).unwrap();
     std::fs::write(&session, text_of.replacen("kind = \"tracker\"", "kind = \"tracker\"\nnoise_um = 50", 1)).unwrap();
     let output = abbe(&["fit", text(&session), "--quiet"]);
-    let found = message(&output);
-    assert!(
-        !output.status.success() && found.contains("% of the link") && found.contains("--allow-implausible"),
-        "{found}"
-    );
+    let found = message(&output).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(!output.status.success() && found.contains("J4") && found.contains("opposite sign"), "{found}");
+    assert!(found.contains("--allow-implausible"), "{found}");
     assert!(abbe(&["fit", text(&session), "--quiet", "--allow-implausible"]).status.success());
     // That the session may read files elsewhere says nothing of its estimates.
     assert!(!abbe(&["fit", text(&session), "--quiet", "--allow-outside"]).status.success());
@@ -280,7 +278,7 @@ fn a_fit_refuses_location_errors_that_mean_nothing() {
     let output = abbe(&["trace", text(&session), "--quiet"]);
     let found = message(&output);
     assert!(!output.status.success() && output.stdout.is_empty(), "{found}");
-    assert!(found.contains("% of the link") && found.contains("--allow-implausible"), "{found}");
+    assert!(found.contains("--allow-implausible"), "{found}");
 }
 
 #[test]
