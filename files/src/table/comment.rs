@@ -19,7 +19,7 @@ pub(crate) fn is_comment(text: &str) -> bool {
         };
         rest.is_some_and(|rest| rest.is_empty() || rest.starts_with([',', ';', '\t', '|']) || next_is_number(rest))
     };
-    text.starts_with('#') && !CELL_ERRORS.iter().any(|error| is_error(&error))
+    text.starts_with('#') && !CELL_ERRORS.iter().any(is_error)
 }
 
 #[cfg(test)]

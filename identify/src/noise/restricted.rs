@@ -351,7 +351,7 @@ pub(super) mod tests {
         pub fn independent(runs: Vec<Vec<f64>>) -> DetrendedRuns {
             let alike = runs.into_iter().map(|run| {
                 let n = run.len();
-                AlikeRuns::of(&[0..n], &trend(n), &[run], MAX_ORDER)
+                AlikeRuns::of(std::slice::from_ref(&(0..n)), &trend(n), &[run], MAX_ORDER)
             });
             DetrendedRuns { alike: alike.collect() }
         }

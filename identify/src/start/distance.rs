@@ -48,18 +48,26 @@ pub(super) fn locate(session: &Session, tests: &mut [Test]) {
             for group in groups {
                 let members: Vec<usize> =
                     (0..tests.len()).filter(|k| open(&tests[*k]) && tests[*k].group(by) == group).collect();
+                // One object has one place, however differently its tests state it.
+                let Station::Distance(distance) = &tests[members[0]].station else { continue };
+                let place = if first == STATION { distance.station } else { distance.reflector };
+                move_to(tests, &members, first, place);
                 let Some(step) = step(&session.machine, tests, &members, first) else { continue };
                 largest = largest.max(step.norm());
-                for member in members {
-                    if let Station::Distance(distance) = &mut tests[member].station {
-                        let point = if first == STATION { &mut distance.station } else { &mut distance.reflector };
-                        point.iter_mut().zip(step.iter()).for_each(|(x, step)| *x += step);
-                    }
-                }
+                move_to(tests, &members, first, std::array::from_fn(|k| place[k] + step[k]));
             }
         }
         if largest < SETTLED_MM {
             return;
+        }
+    }
+}
+
+/// Moves the station or the reflector of some tests.
+fn move_to(tests: &mut [Test], members: &[usize], first: usize, place: [f64; 3]) {
+    for member in members {
+        if let Station::Distance(distance) = &mut tests[*member].station {
+            *(if first == STATION { &mut distance.station } else { &mut distance.reflector }) = place;
         }
     }
 }

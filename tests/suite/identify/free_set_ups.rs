@@ -153,6 +153,7 @@ impl Simulated {
         );
         fs::write(folder.join("machine.toml"), self.machine()).unwrap();
         let count = if kind == Kind::Distance { 4 } else { 1 };
+        let aside_of_tip = direction(&mut aside) * off_mm;
         for number in 0..count {
             let station =
                 [[900.0, 100.0, -100.0], [-800.0, 700.0, 50.0], [200.0, -900.0, 300.0], [100.0, 300.0, 1500.0]]
@@ -192,10 +193,8 @@ impl Simulated {
                 writeln!(csv, "{}", cells.join(",")).unwrap();
             }
             fs::write(folder.join(format!("{number}.csv")), csv).unwrap();
-            let [start, place] = [tip, station].map(|point| {
-                let [x, y, z]: [f64; 3] = (point + direction(&mut aside) * off_mm).into();
-                format!("[{x:.6}, {y:.6}, {z:.6}]")
-            });
+            let shown = |point: Vector3<f64>| format!("[{:.6}, {:.6}, {:.6}]", point.x, point.y, point.z);
+            let (start, place) = (shown(tip + aside_of_tip), shown(station + direction(&mut aside) * off_mm));
             let points = match kind {
                 Kind::Distance => {
                     format!(

@@ -173,7 +173,7 @@ fn folder() -> TestFolder {
             "  <joint name=\"j{k}\" type=\"revolute\">\n    <parent link=\"l{k}\"/><child link=\"l{}\"/>\n    <origin xyz=\"0.3 0 {z}\" rpy=\"{} 0 0\"/>\n\
              <axis xyz=\"0 0 1\"/><limit lower=\"-2.5\" upper=\"2.5\" effort=\"1\" velocity=\"1\"/>\n  </joint>\n",
             k + 1,
-            1.5707963 * f64::from(k as u32 % 2)
+            std::f64::consts::FRAC_PI_2 * f64::from(k as u32 % 2)
         )
     };
     let links: String = (0..5).map(|k| format!("  <link name=\"l{k}\"/>\n")).collect();

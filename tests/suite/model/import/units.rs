@@ -43,7 +43,7 @@ fn rows(radius_mm: f64) -> impl Iterator<Item = [f64; 7]> {
     })
 }
 
-/// A file with lengths in a unit of so many mm, deviations in one of so many mm, and angles in one of so many degrees.
+/// A file whose unit of length and whose unit of deviation are so many mm, and whose unit of angle is so many degrees.
 fn file(header: &str, radius_mm: f64, [length, deviation, angle]: [f64; 3]) -> String {
     let row = |[c, x, y, z, dx, dy, dz]: [f64; 7]| {
         let cells = [c / angle, x / length, y / length, z / length, dx / deviation, dy / deviation, dz / deviation];
