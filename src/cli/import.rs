@@ -68,7 +68,7 @@ pub struct ImportArguments {
     /// Allow a session to read files outside its own folder.
     #[arg(long)]
     allow_outside: bool,
-    /// Accept readings that contradict the machine, such as location errors above 5 % of a link.
+    /// Accept readings that contradict the machine, such as axes more than 5 % of a link beside their place.
     #[arg(long)]
     allow_implausible: bool,
     #[command(flatten)]

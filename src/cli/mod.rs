@@ -175,8 +175,8 @@ impl DataArguments {
 /// What an identification does with estimates that mean nothing.
 #[derive(Args, Clone, Copy)]
 pub struct PlausibilityArguments {
-    /// Accept estimates that mean nothing, such as axes more than 5 % of a link beside their place, though another reading of
-    /// the file explains them.
+    /// Accept readings that contradict the machine, such as axes more than 5 % of a link beside their place. Without it they
+    /// are refused where another reading of the file explains them.
     #[arg(long)]
     allow_implausible: bool,
 }

@@ -3,8 +3,8 @@
 //! The whitened Jacobian is in physical units (1 mm, 0.01 rad). A singular value `s` then means: a change by the
 //! physical size along its direction changes the readings by `s` standard deviations in total. A direction with `s < 1`
 //! is not identifiable, because even a gross error along it is below the noise. Two kinds of such directions are told
-//! apart. A *structural* null direction has a singular value of zero but for rounding: it changes no reading, whatever the
-//! noise. A *weak* one changes readings by less than their noise.
+//! apart. A *structural* null direction has a singular value of zero but for the rounding of positions in a file: it changes
+//! no reading, whatever the noise. A *weak* one changes readings by less than their noise.
 //!
 //! What the parameters are along a structural null direction is a choice of gauge. The set-up takes its part, so that the
 //! other parameters have the least change in physical size: with `Z` a basis of these directions, `Z_m` its rows of the other
@@ -21,7 +21,7 @@ use faer::Mat;
 
 use super::null_space::{MIN_PIVOT, combinations};
 use super::solve::Svd;
-use super::tolerances::MIN_IDENTIFIABLE;
+use super::tolerances::{COLLINEAR, MIN_IDENTIFIABLE};
 use super::triangle::Triangle;
 use crate::error::IdentifyError;
 
@@ -76,6 +76,7 @@ impl Rank {
         let v = directions.right();
         let null_space = v.subcols(rank, n - rank).to_owned();
         let (null_combinations, pivots) = combinations(null_space.as_ref(), scaled.as_ref(), preference, MIN_PIVOT);
+        let structural = n - directions.rank(COLLINEAR).clamp(rank, numerical);
         let signal = |row: &Vec<f64>| {
             let along = |i: usize| row.iter().enumerate().map(|(j, share)| scaled[(i, j)] * share).sum::<f64>();
             (0..n).map(|i| along(i).powi(2)).sum::<f64>().sqrt()
@@ -89,15 +90,7 @@ impl Rank {
             Mat::from_fn(n, rank, |i, k| v[(i, k)] * size[i])
         };
         let singular_values = directions.singular_values;
-        Ok(Rank {
-            singular_values,
-            identifiable_basis,
-            null_combinations,
-            pivots,
-            weak_u,
-            null_space,
-            structural: n - numerical,
-        })
+        Ok(Rank { singular_values, identifiable_basis, null_combinations, pivots, weak_u, null_space, structural })
     }
 
     /// The same with the gauge of a set-up: along structural null directions the parameters of the set-up change, the others

@@ -24,6 +24,8 @@ const TOOL: usize = 1;
 /// A position is a gross error if its residual is this many times the median, and so many mm.
 const GROSS: f64 = 10.0;
 const MIN_GROSS_MM: f64 = 1.0;
+/// Residual, as a share of the scatter of the positions, from which a target may be the mirror image of the right one.
+const MIRRORED: f64 = 0.01;
 /// Singular values below this share of the number of positions leave their direction as it is stated.
 const OPEN: f64 = 1e-9;
 
@@ -90,6 +92,13 @@ impl Member {
             readings,
         }
     }
+
+    /// The root mean square distance of the measured positions from their mean, mm.
+    fn scatter_mm(&self) -> f64 {
+        let share = 1.0 / self.observed.len().max(1) as f64;
+        let mean = self.observed.iter().sum::<Vector3<f64>>() * share;
+        (self.observed.iter().map(|point| (point - mean).norm_squared()).sum::<f64>() * share).sqrt()
+    }
 }
 
 /// The rows with all coordinates, and these. A row without one says nothing of the point. Of an instrument that measures no
@@ -109,11 +118,21 @@ fn target(session: &Session, members: &[Member]) -> Option<Vector3<f64>> {
     if first.kind() == InstrumentKind::Socket {
         return linear(members, &vec![None; members.len()], Vector3::zeros()).map(|(step, _)| stated + step);
     }
-    // At the end of the chain, and where it is stated.
+    let best = |starts: &[Vector3<f64>]| {
+        let found = starts.iter().filter_map(|start| alternated(&session.machine, members, start - stated));
+        found.min_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    // Where it is stated, and at the end of the chain.
     let end = session.machine.axes.last().map_or(stated, |axis| axis.origin_mm.into());
-    let starts = [stated, end].into_iter();
-    let found = starts.filter_map(|start| alternated(&session.machine, members, start - stated));
-    found.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(step, _)| stated + step)
+    let mut found = best(&[stated, end]);
+    let scatter = members.iter().map(Member::scatter_mm).fold(0.0, f64::max);
+    if found.is_none_or(|(_, squares)| squares > (MIRRORED * scatter).powi(2)) {
+        // Few axes see a target and its mirror image nearly alike: from the other side the alternation ends elsewhere.
+        let beside = [Vector3::x(), Vector3::y(), Vector3::z()].map(|unit| unit * scatter);
+        let sides = beside.iter().flat_map(|beside| [end + beside, end - beside]).collect::<Vec<_>>();
+        found = best(&sides).into_iter().chain(found).min_by(|a, b| a.1.total_cmp(&b.1));
+    }
+    found.map(|(step, _)| stated + step)
 }
 
 /// The target less the stated one with the median of squared residuals that it leaves, from a start.
