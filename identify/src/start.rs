@@ -10,10 +10,10 @@ mod target;
 
 use abbe_model::instrument::{Group, InstrumentKind, SharedBy, Station};
 use abbe_model::session::{Prior, Session, Test};
+use nalgebra::Vector3;
 
 use crate::fit::minimum;
 use crate::noise::Noise;
-use crate::parameters::Parameter;
 use crate::problem::Problem;
 
 /// Readings of a test that are used.
@@ -23,7 +23,8 @@ const MAX_ROWS: usize = 300;
 const NEAR_MM: f64 = 1.0;
 
 /// Tests with readings, with the points found that have no prior, and their stations, with the poses found that are free.
-pub(crate) fn located(session: &Session, mut tests: Vec<Test>, noise: &Noise) -> (Vec<Test>, Vec<Station<f64>>) {
+pub(crate) fn located(session: &Session, stated: Vec<Test>, noise: &Noise) -> (Vec<Test>, Vec<Station<f64>>) {
+    let mut tests = stated.clone();
     target::locate(session, &mut tests);
     distance::locate(session, &mut tests);
     let stations = stations(session, &tests);
@@ -31,6 +32,7 @@ pub(crate) fn located(session: &Session, mut tests: Vec<Test>, noise: &Noise) ->
     if tests.iter().any(is_left)
         && let Some(found) = set_up_alone(session, &tests, &stations, noise)
     {
+        let found = if are_near(&found, &stated) { stated } else { found };
         let stations = self::stations(session, &found);
         return (found, stations);
     }
@@ -79,6 +81,16 @@ fn set_point(station: &mut Station<f64>, side: usize, to: [f64; 3]) {
     }
 }
 
+/// Whether no point is far from where it is stated.
+fn are_near(found: &[Test], stated: &[Test]) -> bool {
+    found.iter().zip(stated).flat_map(|(found, stated)| [0, 1].map(|side| (found, stated, side))).all(
+        |(found, stated, side)| {
+            let places = point_mm(&found.station, side).zip(point_mm(&stated.station, side));
+            places.is_none_or(|(found, stated)| (Vector3::from(found) - Vector3::from(stated)).norm() <= NEAR_MM)
+        },
+    )
+}
+
 /// The tests with their free points where a fit of the set-up alone to the nominal machine finds them. `None` where it
 /// finds nothing better.
 fn set_up_alone(session: &Session, tests: &[Test], stations: &[Station<f64>], noise: &Noise) -> Option<Vec<Test>> {
@@ -87,10 +99,6 @@ fn set_up_alone(session: &Session, tests: &[Test], stations: &[Station<f64>], no
     let found = minimum(&problem, None).ok()?;
     let list = &problem.parameters.list;
     if problem.sum_of_squares(&found.beta) >= problem.sum_of_squares(&vec![0.0; list.len()]) {
-        return None;
-    }
-    let moves = |(parameter, value): (&Parameter, &f64)| parameter.prior == Prior::Free && value.abs() > NEAR_MM;
-    if !list.iter().zip(&found.beta).any(moves) {
         return None;
     }
     let mut moved = tests.to_vec();

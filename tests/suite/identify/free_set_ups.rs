@@ -259,9 +259,12 @@ fn any_start_gives_the_same_fit() {
                     };
                     for ((id, value, u), (other, expected, _)) in errors(&found).into_iter().zip(errors(right)) {
                         assert_eq!(id, other);
-                        // A set-up that was stated elsewhere has another gauge, by the product of its displacement and the errors.
-                        let apart = (value - expected).abs();
-                        assert!(!is_same || apart < 0.1 * u, "{id}: {value} and {expected}, u = {u}");
+                        // Along parallel axes a target stays where it is stated, and positions of tilted axes refer to it.
+                        let refers = axes.len() == SCARA.len() && id[1..3] == *"X0";
+                        assert!(
+                            !is_same || refers || (value - expected).abs() < 0.1 * u,
+                            "{id}: {value} and {expected}"
+                        );
                     }
                 }
             }
