@@ -388,7 +388,31 @@ def robots(runs, data):
             f"## KUKA iiwa 14 in sockets\n\n{fit['readings']} poses, rms of the 3-vector.\n\n" + table(columns, rows)
             + f"\n\n`trace` finds: {in_words(trace['effects'])}." + before_and_after + runs.drawn("kuka", over_joints)
         )
+    parts += positioner(runs, data)
     return "\n".join(parts) or None
+
+
+def positioner(runs, data):
+    """A positioner of two axes before a camera: the section, or nothing where its file is not there."""
+    file = data / "industrial_calibration" / "measurements.yaml"
+    if not file.exists():
+        return []
+    rows = ["j1_deg,j2_deg,px_mm,py_mm,pz_mm,qx,qy,qz,qw"]
+    for entry in re.split(r"^'[0-9]+':", file.read_text(encoding="utf-8"), flags=re.M)[1:]:
+        pose = {key: float(value) for key, value in re.findall(r"^    (q[wxyz]|[xyz]): (\S+)", entry, re.M)}
+        joints = [math.degrees(float(joint)) for joint in re.findall(r"^  - (\S+)", entry, re.M)]
+        rows.append(",".join(map(repr, joints + [1e3 * pose[key] for key in "xyz"] + [pose[key] for key in ("qx", "qy", "qz", "qw")])))
+    (runs.folder / "positioner.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    # Where the target stands on the table is not known: it is found before the fit.
+    for name in ("machine", "session"):
+        shutil.copy(OWN / "positioner" / f"{name}.toml", runs.folder / f"positioner-{name}.toml")
+    fit, taken = runs.abbe("fit", "positioner-session.toml")
+    errors = {error["id"]: error for error in fit["parameters"]}
+    quoted = [[f"`{id}`", value_and_u(errors[id])] for id in ("EX0J2", "EA0J2")]
+    return [
+        f"## Two-axis positioner before a camera\n\n{fit['readings']} poses of a target whose place on the table no one stated, rank {fit['rank']} of"
+        f" {fit['parameter_count']}, {taken:.1f} s. The offset and the angle of the second axis against the first:\n\n" + table(["error", "value"], quoted) + "\n"
+    ]
 
 
 SOURCES = [
@@ -397,6 +421,7 @@ SOURCES = [
     ["`linear_axis_ess`", "linear axis, ISO 230-2", "[ecmc_target_muts_logger](https://github.com/anderssandstrom/ecmc_target_muts_logger), `b02/x`", "none stated"],
     ["`landgraf_ur10`", "UR10 before a laser tracker", "[ipa-robot-accuracy](https://github.com/christianlandgraf/ipa-robot-accuracy), Landgraf et al., CASE 2021", "MIT"],
     ["`mukca/kuka_14`", "KUKA iiwa 14, ball in sockets", "[kinematics_calibration](https://github.com/platonics-delft/kinematics_calibration)", "MIT"],
+    ["`industrial_calibration`", "two-axis positioner before a camera, 205 poses", "[industrial_calibration](https://github.com/ros-industrial/industrial_calibration), `examples/data/kinematic_calibration/measurements.yaml`", "Apache-2.0"],
 ]
 
 

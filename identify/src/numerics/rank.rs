@@ -21,7 +21,7 @@ use faer::Mat;
 
 use super::null_space::{MIN_PIVOT, combinations};
 use super::solve::Svd;
-use super::tolerances::{COLLINEAR, MIN_IDENTIFIABLE};
+use super::tolerances::{COLLINEAR, MIN_IDENTIFIABLE, ROUNDING_OF_COMBINATIONS};
 use super::triangle::Triangle;
 use crate::error::IdentifyError;
 
@@ -108,6 +108,10 @@ impl Rank {
         // Null directions are in descending order of their singular values.
         let weak = self.null_space.ncols() - structural;
         let space = self.null_space.subcols(weak, structural);
+        let takes_part = |j: usize| (0..structural).any(|k| space[(j, k)].abs() > ROUNDING_OF_COMBINATIONS);
+        if !(0..n).any(|j| is_set_up[j] && takes_part(j)) {
+            return Ok(self);
+        }
         let part = Mat::from_fn(others.len(), structural, |i, k| space[(others[i], k)]);
         let inverse = Svd::of(part.as_ref())?.pseudo_inverse_above(MIN_SHARE_OF_MACHINE);
         let basis = &mut self.identifiable_basis;

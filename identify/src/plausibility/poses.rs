@@ -7,7 +7,7 @@ use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
 use nalgebra::Vector3;
 
-use super::hypotheses::{Hypothesis, lengths, units, with_readings};
+use super::hypotheses::{Hypothesis, columns_exchanged, lengths, units, with_readings};
 use super::quick_fit::{thinned, trial};
 use super::results::{Suggestion, SuggestionKind};
 use crate::noise::{Noise, NoiseSource};
@@ -173,18 +173,7 @@ fn of_poses(session: &Session) -> Vec<Hypothesis> {
             let words = format!("the positions of {names} have the opposite sign");
             list.push(Hypothesis::new(SuggestionKind::ColumnSign, &names, words, scaled(set, -1.0)));
         }
-        for (place, &first) in axes.iter().enumerate() {
-            for &second in &axes[place + 1..] {
-                let changed = with_readings(session, |_, positions, _| positions.swap(first, second));
-                let names = [first, second].map(|k| machine.axes[k].name.as_str());
-                list.push(Hypothesis::new(
-                    SuggestionKind::ColumnsExchanged,
-                    &names.join(", "),
-                    format!("the columns of {} and {} are exchanged", names[0], names[1]),
-                    changed,
-                ));
-            }
-        }
+        list.extend(columns_exchanged(session, &axes));
     }
     list
 }

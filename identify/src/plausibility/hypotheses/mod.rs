@@ -93,18 +93,7 @@ fn axes(session: &Session) -> Vec<Hypothesis> {
         }
     }
     let linear: Vec<usize> = used.iter().copied().filter(|k| machine.axes[*k].kind == AxisKind::Linear).collect();
-    for (place, &first) in linear.iter().enumerate() {
-        for &second in &linear[place + 1..] {
-            let changed = with_readings(session, |_, positions, _| positions.swap(first, second));
-            let names = [first, second].map(|k| machine.axes[k].name.as_str());
-            list.push(Hypothesis::new(
-                SuggestionKind::ColumnsExchanged,
-                &names.join(", "),
-                format!("the columns of {} and {} are exchanged", names[0], names[1]),
-                changed,
-            ));
-        }
-    }
+    list.extend(columns_exchanged(session, &linear));
     for kind in [AxisKind::Rotary, AxisKind::Linear] {
         let of_kind: Vec<usize> = used.iter().copied().filter(|k| machine.axes[*k].kind == kind).collect();
         if of_kind.is_empty() {
@@ -122,6 +111,32 @@ fn axes(session: &Session) -> Vec<Hypothesis> {
                 changed,
             ));
         }
+    }
+    list
+}
+
+/// The columns of two of these axes exchanged, and those of three or more in reverse order.
+pub(super) fn columns_exchanged(session: &Session, axes: &[usize]) -> Vec<Hypothesis> {
+    let name = |axis: usize| session.machine.axes[axis].name.as_str();
+    let exchanged = |pairs: &[(usize, usize)], subject: &str, words: String| {
+        let changed = with_readings(session, |_, positions, _| {
+            pairs.iter().for_each(|(one, other)| positions.swap(*one, *other));
+        });
+        Hypothesis::new(SuggestionKind::ColumnsExchanged, subject, words, changed)
+    };
+    let pairs = axes.iter().enumerate().flat_map(|(place, one)| axes[place + 1..].iter().map(|other| (*one, *other)));
+    let mut list: Vec<Hypothesis> = pairs
+        .map(|(one, other)| {
+            let names = [name(one), name(other)];
+            let words = format!("the columns of {} and {} are exchanged", names[0], names[1]);
+            exchanged(&[(one, other)], &names.join(", "), words)
+        })
+        .collect();
+    if axes.len() > 2 {
+        let reversed: Vec<(usize, usize)> = (0..axes.len() / 2).map(|k| (axes[k], axes[axes.len() - 1 - k])).collect();
+        let names = axes.iter().map(|axis| name(*axis)).collect::<Vec<_>>().join(", ");
+        let words = format!("the columns of {names} are in reverse order");
+        list.push(exchanged(&reversed, &names, words));
     }
     list
 }
