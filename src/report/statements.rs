@@ -81,8 +81,10 @@ fn correct(statements: &Statements) -> String {
     large.sort_by(|a, b| ratio(b).total_cmp(&ratio(a)));
     if !statements.good.goodness.quotable {
         return match statements.good.goodness.not_judged {
-            Some(_) => "What to correct: nothing yet; the unit of the readings is in doubt".to_string(),
-            None => "What to correct: nothing yet; the effect that the model lacks biases the estimates".to_string(),
+            Some(NotJudged::WrongUnit) => {
+                "What to correct: nothing yet; the unit of the readings is in doubt".to_string()
+            }
+            _ => "What to correct: nothing yet; the effect that the model lacks biases the estimates".to_string(),
         };
     }
     let further = || {
