@@ -13,6 +13,7 @@ use super::{Fit, further_steps, positions};
 use crate::error::IdentifyError;
 use crate::heldout::{rms_by_unit_mm, rms_mm};
 use crate::noise::{self, Noise, NoiseSource, PureError, ShownNoise, outliers};
+use crate::numerics::solve::Svd;
 use crate::numerics::triangle::Triangle;
 use crate::parameters::Role;
 use crate::plausibility;
@@ -274,12 +275,17 @@ fn nominal_residual_mm(problem: &Problem) -> Result<f64, IdentifyError> {
     let nominal = vec![0.0; list.len()];
     let (r, c, rest) = Triangle::new(list.len()).merged(&problem.triangles(&nominal)?).parts();
     let setups: Vec<usize> = (0..list.len()).filter(|j| list[*j].role == Role::Setup).collect();
-    let rows = Mat::from_fn(list.len(), setups.len() + 1, |i, j| match setups.get(j) {
-        Some(setup) => r[(i, *setup)],
-        None => c[i],
-    });
+    let mut left = c;
+    if !setups.is_empty() {
+        // Without their priors set-up quantities may be collinear: the solution of least norm.
+        let of_setups = Mat::from_fn(list.len(), setups.len(), |i, j| r[(i, setups[j])]);
+        let found = Svd::of(of_setups.as_ref())?.solve(&left, 0.0);
+        for (i, left) in left.iter_mut().enumerate() {
+            *left -= found.iter().enumerate().map(|(j, x)| of_setups[(i, j)] * x).sum::<f64>();
+        }
+    }
     let count = problem.scalars() as f64;
-    let sum_of_squares = Triangle::of(rows).parts().2 + rest;
+    let sum_of_squares = left.iter().map(|left| left * left).sum::<f64>() + rest;
     Ok((sum_of_squares / count.max(1.0)).sqrt() * problem.noise.sigma_mm)
 }
 

@@ -156,14 +156,17 @@ fn the_build_is_known_by_its_sources() {
     assert_eq!(abbe::fleet::BUILD, format!("{}+{}", env!("CARGO_PKG_VERSION"), digits.trim()));
 }
 
+/// The number of results below a folder, by their names alone: a temporary file may be gone before it is read.
+fn results_below(folder: &Path) -> usize {
+    let paths = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let is_result = |path: &Path| path.extension().is_some_and(|extension| extension == "json");
+    paths.map(|path| if path.is_dir() { results_below(&path) } else { usize::from(is_result(&path)) }).sum()
+}
+
 #[test]
 fn a_killed_run_is_continued() {
     let place = fleet(12, monthly);
-    // The names alone: a temporary file may be gone before it is read.
-    let count = || {
-        let entries = fs::read_dir(place.at("results/results")).into_iter().flatten().flatten();
-        entries.filter(|entry| entry.path().extension().is_some_and(|extension| extension == "json")).count()
-    };
+    let count = || results_below(&place.at("results/results"));
     for _ in 0..2 {
         let before = count();
         let mut child = Command::new(env!("CARGO_BIN_EXE_abbe"))
