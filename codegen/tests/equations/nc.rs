@@ -531,9 +531,9 @@ fn diagonals<'a>(place: &Path, axes: impl Iterator<Item = ((&'a &'a str, &'a str
             let decoded = if control.word() == "heidenhain" { of_plain_text } else { of_g_codes };
             let moves = decoded(text, Counting::Turns);
             holds_the_plan(&session, test, &moves, 0.1_f64.powi(control.decimals() as i32), f64::INFINITY);
-            // Together: one block for each of four traversals; in turn: three for each of ten steps.
+            // A stop at each target. Together: one block for each of ten steps of four traversals; in turn: three.
             let measured = moves.iter().filter(|own| own.run.is_some()).count();
-            assert_eq!(measured, if test.name == "steps" { 4 * 30 } else { 4 }, "{}", control.word());
+            assert_eq!(measured, if test.name == "steps" { 4 * 30 } else { 4 * 10 }, "{}", control.word());
             let reached = moves.iter().flat_map(|own| &own.points).map(|point| point[&'X'].abs()).fold(0.0, f64::max);
             assert!((reached - last_mm).abs() < 0.01, "{}: {reached}", control.word());
         }
