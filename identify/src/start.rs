@@ -8,7 +8,10 @@
 mod distance;
 mod target;
 
+use std::sync::Arc;
+
 use abbe_model::instrument::{Group, InstrumentKind, SharedBy, Station};
+use abbe_model::session::readings::Readings;
 use abbe_model::session::{Prior, Session, Test};
 use nalgebra::Vector3;
 
@@ -24,6 +27,10 @@ const NEAR_MM: f64 = 1.0;
 
 /// Tests with readings, with the points found that have no prior, and their stations, with the poses found that are free.
 pub(crate) fn located(session: &Session, stated: Vec<Test>, noise: &Noise) -> (Vec<Test>, Vec<Station<f64>>) {
+    if !stated.iter().all(is_read) {
+        let stations = stations(session, &stated);
+        return (stated, stations);
+    }
     let mut tests = stated.clone();
     target::locate(session, &mut tests);
     distance::locate(session, &mut tests);
@@ -37,6 +44,12 @@ pub(crate) fn located(session: &Session, stated: Vec<Test>, noise: &Noise) -> (V
         return (found, stations);
     }
     (tests, stations)
+}
+
+/// Whether anything was observed. The readings of a plan are zero: they say nothing of where a set-up is. A socket has none.
+fn is_read(test: &Test) -> bool {
+    let is_observed = |readings: &Arc<Readings>| readings.observed.iter().any(|value| *value != 0.0);
+    !test.station.kind().entry().has_readings || test.readings.as_ref().is_some_and(is_observed)
 }
 
 /// The session with the targets, balls and stations found that have no prior. Others stay.
