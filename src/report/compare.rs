@@ -1,7 +1,5 @@
 //! Differences between models of one machine.
 
-use std::cmp::Ordering;
-
 use abbe::apply::compare::results::{Comparison, Difference, Pair};
 use abbe::document::StatedComparison;
 use abbe::identify::results::Outlier;
@@ -10,7 +8,7 @@ use abbe::model::words::counted;
 use super::block::{Report, Text};
 use super::figure::bars::{Row, Value, Values};
 use super::figure::{Chart, Figure, Quantity};
-use super::number::{fixed, p_equals, probability, quantity, unit, units, value_and_u};
+use super::number::{p_equals, probability, quantity, unit, units, value_and_u};
 use super::statements;
 use super::table::{Cell, Table, cells, numbers};
 
@@ -54,7 +52,7 @@ pub fn report(machine: &str, stated: &StatedComparison<'_>, with_workspace: bool
 fn sentence(comparison: &Comparison, number: usize, pair: &Pair) -> String {
     let volume = match (comparison.workspace.first(), comparison.workspace.get(number + 1)) {
         (Some(before), Some(after)) => {
-            format!("{}; ", volumetric(before.rms_um, after.rms_um))
+            format!("{}; ", statements::volumetric(before.rms_um, after.rms_um))
         }
         _ => String::new(),
     };
@@ -67,16 +65,6 @@ fn sentence(comparison: &Comparison, number: usize, pair: &Pair) -> String {
     };
     let level = comparison.significance;
     format!("{} → {}: {volume}{changed} (any false claim: probability ≤ {level}).", pair.from, pair.to)
-}
-
-/// How the volumetric error changed, in words.
-pub fn volumetric(before_um: f64, after_um: f64) -> String {
-    let [before, after] = [before_um, after_um].map(|um| fixed(um, 2));
-    match before_um.total_cmp(&after_um) {
-        _ if before == after => format!("the volumetric error stays at {after} µm rms"),
-        Ordering::Less => format!("the volumetric error rises from {before} to {after} µm rms"),
-        _ => format!("the volumetric error falls from {before} to {after} µm rms"),
-    }
 }
 
 /// All differences together, and what is not compared.

@@ -1,5 +1,6 @@
 //! The three statements that open a report: is it good, what to correct, what to measure next.
 
+use std::cmp::Ordering;
 use std::path::Path;
 
 use abbe::apply::compare::ComparisonStatement;
@@ -21,7 +22,6 @@ use abbe::plan::results::{Contribution, ErrorAnalysis, PlanAnalysis};
 
 use super::block::Sentence;
 use super::commands::{Commands, MEASURE, NEXT, PROGRAMS};
-use super::compare::volumetric;
 use super::number::{fixed, places, quantity, three_digits, value_and_u};
 use super::parameters::PRIOR;
 use super::provenance::quoted;
@@ -61,6 +61,16 @@ pub fn opening(
         sentences.extend(measure(&statements.measure, Some(&session.machine), commands));
     }
     sentences
+}
+
+/// How the volumetric error changed, in words.
+pub fn volumetric(before_um: f64, after_um: f64) -> String {
+    let [before, after] = [before_um, after_um].map(|um| fixed(um, 2));
+    match before_um.total_cmp(&after_um) {
+        _ if before == after => format!("the volumetric error stays at {after} µm rms"),
+        Ordering::Less => format!("the volumetric error rises from {before} to {after} µm rms"),
+        _ => format!("the volumetric error falls from {before} to {after} µm rms"),
+    }
 }
 
 /// Is it good: residual against noise, and limits, after what is judged.
@@ -411,4 +421,28 @@ pub fn corrections(statements: &Statements) -> Table {
         "Axes at zero: a point of each rotary axis in mm, the direction of each axis as a unit vector, its zero in degrees or mm, and \
          the change to enter",
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use abbe::identify::results::{Goodness, GoodnessVerdict};
+
+    use super::*;
+
+    /// A residual that is taken for noise may still have structure: the unit is in doubt only where it is.
+    #[test]
+    fn what_keeps_from_correcting_is_why_the_estimates_are_not_quotable() {
+        for (not_judged, why) in [
+            (None, "effect that the model lacks"),
+            (Some(NotJudged::NoNoise), "effect that the model lacks"),
+            (Some(NotJudged::WrongUnit), "unit of the readings"),
+        ] {
+            let goodness = Goodness { not_judged, ..Goodness::default() }.with_verdict(GoodnessVerdict::Structured);
+            let good = GoodStatement { goodness, ..GoodStatement::default() };
+            let measure = NextStep::Trace.into();
+            let statements =
+                Statements { good, correct: Vec::new(), changed: Vec::new(), further: Vec::new(), measure };
+            assert!(correct(&statements).contains(why), "{}", correct(&statements));
+        }
+    }
 }

@@ -175,8 +175,14 @@ pub fn tables(
         Ok((table, rows.into_iter().flatten().collect()))
     };
     let (errors, _) = best_locations(model, tool_mm)?;
-    let (calibrated, _) = of_errors(&errors)?;
+    let (mut calibrated, _) = of_errors(&errors)?;
     let (nominal_table, _) = of_errors(&zero)?;
+    // Angles near ±180° are those near the nominal ones.
+    for (row, nominal) in calibrated.joints.iter_mut().zip(&nominal_table.joints) {
+        let near = |angle: &mut f64, nominal: f64| *angle += 360.0 * ((nominal - *angle) / 360.0).round();
+        near(&mut row.alpha_deg, nominal.alpha_deg);
+        near(&mut row.theta_deg, nominal.theta_deg);
+    }
     let mut columns: Vec<(usize, DVector<f64>)> = Vec::new();
     for (index, parameter) in model.parameters.iter().enumerate() {
         let name = ErrorName::parse(&parameter.id).filter(|name| name.kind == ErrorKind::Location);

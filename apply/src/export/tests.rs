@@ -127,6 +127,15 @@ fn denavit_hartenberg_parameters_give_the_tool_positions_of_the_model() {
     // Axes 2, 3 and 4 are parallel: Hayati's angle holds what the errors tilt them by.
     assert!(calibrated.joints[2].beta_deg != 0.0 && calibrated.joints[1].beta_deg == 0.0);
     assert!(as_designed.joints.iter().all(|row| row.beta_deg == 0.0));
+    // Nominal angles of ±180° do not change their sign by the errors.
+    for seed in 0..20 {
+        let errors = random_errors(&robot(), &mut rand_pcg::Pcg64::seed_from_u64(seed));
+        let found = dh::tables(&self::model(robot(), &errors), tool_mm, Convention::Modified, None).unwrap();
+        for (row, nominal) in found.calibrated.joints.iter().zip(&found.nominal.joints) {
+            let turned = [row.alpha_deg - nominal.alpha_deg, row.theta_deg - nominal.theta_deg];
+            assert!(turned.iter().all(|turned| turned.abs() < 5.0), "{row:?} {nominal:?}");
+        }
+    }
 }
 
 /// The numbers of an attribute such as `xyz="0 0 1"`.

@@ -60,9 +60,9 @@ pub struct LeastSquaresSolution {
 const MAX_ITERATIONS: usize = 1000;
 /// Attempts to find a damping with which a step lowers the sum of squares.
 const MAX_ATTEMPTS: usize = 30;
-/// Predicted decrease of the sum of squares, as a share of its mean, at which the iterations end: 10⁻⁸ standard
+/// Predicted decrease of the sum of squares, as a share of its mean, at which the iterations end: 10⁻¹⁰ standard
 /// uncertainties. One more step follows.
-const CONVERGED: f64 = 1e-16;
+const CONVERGED: f64 = 1e-20;
 /// The same for steps that do not end within [`MAX_ITERATIONS`]: a hundredth of a standard uncertainty.
 const NEGLIGIBLE: f64 = 1e-4;
 /// Decrease of the sum of squares, as a share of it, that is below the rounding of the sum.
@@ -287,7 +287,7 @@ mod tests {
         assert!((found.x[0] - 1.0).abs() < 1e-12, "{:?}", found.x);
         // The standard uncertainty of x with this residual: the Jacobian has the length √5 there.
         let u = (found.sum_of_squares / Poorly.degrees_of_freedom() / 5.0).sqrt();
-        assert!(found.x[1].abs() < 1e-8 * u, "{:?}, u = {u}", found.x);
+        assert!(found.x[1].abs() < 1e-10 * u, "{:?}, u = {u}", found.x);
     }
 
     /// `r = (x₀ − x, b + x²/2)`: near the minimum the neglected second derivative is `b` times `JᵀJ`. With `b = ∓0.993`
