@@ -330,20 +330,34 @@ fn a_weight_at_a_joint_has_the_moment_of_its_lever() {
 
 /// The bar turns about its ball, so that its length does not show the mistake.
 #[test]
-fn degrees_in_a_column_of_radians_are_doubted() {
-    for (column, doubted) in [("c_rad", true), ("c_deg", false)] {
+fn positions_in_another_unit_are_doubted() {
+    const SWEEP: &str = "sweep = { axis = \"C\", from_deg = 0, to_deg = 360, step_deg = 10, feed_deg_min = 500 }\n";
+    for (column, unit, sweep, doubt) in [
+        ("c_rad", 1.0, "", Some("axis `C` goes to 20626.481 deg, 57 turns from zero")),
+        ("c_deg", 1.0, SWEEP, None),
+        ("c_deg", 1.0, "", None),
+        (
+            "c_deg",
+            1.0_f64.to_radians(),
+            SWEEP,
+            Some("covers 6.283 deg where the session states 360.000 deg, as radians"),
+        ),
+        ("c_rad", 1.0_f64.to_radians(), SWEEP, None),
+    ] {
         let folder = tempfile::tempdir().unwrap();
-        let rows: String = (0..37).map(|k| format!("{},100.0\n", 10 * k)).collect();
+        let rows: String = (0..37).map(|k| format!("{},100.0\n", unit * f64::from(10 * k))).collect();
         fs::write(folder.path().join("t.csv"), format!("{column},length_mm\n{rows}")).unwrap();
         let text = "[machine]\nchain = \"w C b Y X Z t\"\n[machine.axis.C]\n[machine.axis.X]\n[machine.axis.Y]\n\
                     [machine.axis.Z]\n\n[instrument]\nkind = \"ballbar\"\n\n[unknowns]\nerrors = []\n\n[[test]]\n\
                     name = \"T\"\ndata = \"t.csv\"\nbar_mm = 100\nworkpiece_ball_mm = [0, 0, 0]\n\
                     spindle_ball_mm = [0, 0, 100]\n";
         let path = folder.path().join("session.toml");
-        fs::write(&path, text).unwrap();
+        fs::write(&path, format!("{text}{sweep}")).unwrap();
         let warnings = abbe_files::session(&path, &ReadOptions::default()).unwrap().warnings.join("\n");
-        let found = warnings.contains("axis `C` goes to 20626.481 deg, 57 turns from zero");
-        assert_eq!(found, doubted, "{column}: {warnings}");
+        match doubt {
+            Some(doubt) => assert!(warnings.contains(doubt), "{column}: {warnings}"),
+            None => assert!(!warnings.contains("column of"), "{column}: {warnings}"),
+        }
     }
 }
 

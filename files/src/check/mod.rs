@@ -9,6 +9,7 @@ pub(crate) mod setups;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::instrument::{Checked, Fault};
+use abbe_model::session::motion::Motion;
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test, planned};
 
@@ -51,6 +52,7 @@ pub(crate) fn readings(machine: &Machine, test: &Test, readings: &Readings) -> R
         test.station.doubt(&checked),
         planned::beyond_travel(machine, readings),
         many_turns(machine, readings),
+        of_another_unit(machine, test.motion.as_ref(), readings),
         runs::difference_from_stated(test.motion.as_ref(), readings).or_else(|| runs::missing_numbers(readings)),
     ];
     Ok(doubts
@@ -82,6 +84,28 @@ fn many_turns(machine: &Machine, readings: &Readings) -> Option<String> {
             )
         })
     })
+}
+
+/// Share by which the factor between two spans may differ from that of two units.
+const NEAR_FACTOR: f64 = 0.1;
+
+/// A description of an axis whose positions span what the stated motion spans in another unit.
+fn of_another_unit(machine: &Machine, motion: Option<&Motion>, readings: &Readings) -> Option<String> {
+    let (Motion::Sweep { axis, from, to, .. } | Motion::Follow { axis, from, to, .. }) = motion? else { return None };
+    let positions = readings.positions[*axis].iter().copied();
+    let span = positions.clone().fold(f64::NEG_INFINITY, f64::max) - positions.fold(f64::INFINITY, f64::min);
+    let axis = &machine.axes[*axis];
+    let (units, column) = match axis.kind {
+        AxisKind::Rotary => (&[(180.0 / std::f64::consts::PI, "radians")][..], "deg"),
+        AxisKind::Linear => (&[(1e3, "metres"), (25.4, "inches")][..], "mm"),
+    };
+    let stated = (to - from).abs();
+    let (_, unit) = units.iter().find(|(factor, _)| (stated / span / factor - 1.0).abs() < NEAR_FACTOR)?;
+    let [span, stated] = [span, stated].map(|span| axis.kind.to_display(span));
+    Some(format!(
+        "axis `{}` covers {span:.3} {column} where the session states {stated:.3} {column}, as {unit} in a column of {column} would",
+        axis.name
+    ))
 }
 
 /// The warning about a noise of a unit in which no channel reads, while that of the channels is not stated.
