@@ -71,7 +71,7 @@ pub fn stated_rms_mm(problem: &Problem, residuals: &[Vec<f64>]) -> f64 {
     }
 }
 
-/// Holds out each fold in turn. `beta` is the fit of all readings, `triangles` are the factors of the folds there,
+/// The residuals of every test, mm, and those with each fold held out in turn. `beta` is the fit of all readings, `triangles` are the factors of the folds there,
 /// `whole` is the factor of all readings and priors, `basis` spans the identifiable directions (parameters × rank).
 ///
 /// # Errors
@@ -82,7 +82,7 @@ pub fn held_out(
     triangles: &[Triangle],
     whole: &Triangle,
     basis: &Mat<f64>,
-) -> Result<HeldOut, IdentifyError> {
+) -> Result<(Residuals, HeldOut), IdentifyError> {
     let all = WhitenedDirections::of(whole, basis)?;
     let steps = parallel::map(triangles.len(), &|fold| match all.step_without(&triangles[fold])? {
         Some(step) => Ok(step),
@@ -92,21 +92,26 @@ pub fn held_out(
         }
     });
     let steps: Vec<Vec<f64>> = steps.into_iter().collect::<Result<_, IdentifyError>>()?;
-    let residuals = predicted(problem, beta, &steps)?;
-    Ok(HeldOut { rms_mm: rms_mm(problem, &residuals), residuals })
+    let (residuals, held_out) = predicted(problem, beta, &steps)?;
+    Ok((residuals, HeldOut { rms_mm: rms_mm(problem, &held_out), residuals: held_out }))
 }
 
-/// The residuals of every test, mm, outliers included: each fold under the model linearised at `beta`, after the fold's
-/// step.
-fn predicted(problem: &Problem, beta: &[f64], steps: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, IdentifyError> {
+/// Residuals by test, mm.
+type Residuals = Vec<Vec<f64>>;
+
+/// The residuals of every test, mm, outliers included: at `beta`, and each fold under the model linearised there, after the
+/// fold's step.
+fn predicted(problem: &Problem, beta: &[f64], steps: &[Vec<f64>]) -> Result<(Residuals, Residuals), IdentifyError> {
     let values = problem.slot_values(beta);
-    let mut residuals: Vec<Vec<f64>> = vec![Vec::new(); problem.models.len()];
+    let (mut residuals, mut held_out) =
+        (vec![Vec::new(); problem.models.len()], vec![Vec::new(); problem.models.len()]);
     let blocks = problem.blocks();
     let predicted = parallel::map(blocks.len(), &|number| {
         let block = &blocks[number];
         let of_test = problem.own_parameters(block.test);
         let rows = problem.own_rows(&values[block.test], block)?;
-        let mut residual = rows.col(of_test.len()).to_owned();
+        let present = rows.col(of_test.len()).to_owned();
+        let mut residual = present.clone();
         let fold_of = &problem.folds.of_row[block.test][block.rows.clone()];
         let channels = problem.channels(block.test);
         let mut start = 0;
@@ -119,13 +124,15 @@ fn predicted(problem: &Problem, beta: &[f64], steps: &[Vec<f64>]) -> Result<Vec<
             }
             start += count;
         }
-        Ok::<_, IdentifyError>(residual)
+        Ok::<_, IdentifyError>((present, residual))
     });
     // Blocks are in the order of the rows.
     for (block, residual) in blocks.iter().zip(predicted) {
-        residuals[block.test].extend(residual?.iter());
+        let (present, without) = residual?;
+        residuals[block.test].extend(present.iter());
+        held_out[block.test].extend(without.iter());
     }
-    Ok(residuals)
+    Ok((residuals, held_out))
 }
 
 /// The identifiable directions, scaled so that the normal matrix of all readings is the identity.
@@ -200,7 +207,7 @@ mod tests {
     fn simulated(rows: usize, parameters: usize, random: &mut rand_pcg::Pcg64Mcg) -> Triangle {
         let mut triangle = Triangle::new(parameters);
         let block = Mat::from_fn(rows, parameters + 1, |_, _| random.random_range(-1.0..1.0));
-        triangle.absorb(block.as_ref());
+        triangle.absorb(block);
         triangle
     }
 
@@ -238,7 +245,7 @@ mod tests {
         let parameters = 3;
         let mut others = Triangle::new(parameters);
         let block = Mat::from_fn(9, parameters + 1, |_, j| if j == 2 { 0.0 } else { random.random_range(-1.0..1.0) });
-        others.absorb(block.as_ref());
+        others.absorb(block);
         let single_fold = simulated(9, parameters, &mut random);
         let mut whole = others.clone();
         whole.merge(&single_fold);

@@ -131,12 +131,13 @@ enum Spectrum {
 impl NoiseDraws {
     fn of(problem: &Problem, residuals: &[Vec<f64>]) -> NoiseDraws {
         let kept = |test: usize, row: usize| !problem.rejected[test][row];
-        let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
+        let along = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
+        let pure = &along.pure;
         let of_repeats = pure.freedom >= MIN_POOL;
-        let pool = if of_repeats { pool_of_repeats(problem, &pure) } else { pool_of_residual(problem, residuals) };
+        let pool = if of_repeats { pool_of_repeats(problem, pure) } else { pool_of_residual(problem, residuals) };
         let coefficients = problem.noise.ar_coefficients.clone();
         let spectrum = if coefficients.is_empty() {
-            let possible = pure.possible_processes(problem.session.stated_noise_mm(), &problem.tests, kept);
+            let possible = along.possible_processes(problem.session.stated_noise_mm());
             possible.map_or(Spectrum::White, |possible| {
                 Spectrum::not_significant(&possible, problem.noise.sigma_mm, of_repeats)
             })

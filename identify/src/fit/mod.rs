@@ -154,9 +154,23 @@ const LINEAR: f64 = 1e-5;
 /// # Errors
 /// If the model cannot be evaluated, or the iterations do not converge.
 pub fn minimum(problem: &Problem, start: Option<&[f64]>) -> Result<Minimum, IdentifyError> {
-    let (rank, linearised) = rank_at_nominal(problem)?;
-    let mut found = minimum_of_rank(problem, rank, linearised, start)?;
+    minimum_beside(problem, start, None)
+}
+
+/// The same after a change of noise and outliers alone, which leaves the rank of the fit `before` where all parameters are
+/// well determined. The linearisation at the nominal machine is spared then.
+fn minimum_beside(problem: &Problem, start: Option<&[f64]>, before: Option<&Fit>) -> Result<Minimum, IdentifyError> {
     let has_families = !families::families(&problem.parameters).is_empty();
+    let is_determined = |rank: &Rank| rank.singular_values.last().is_none_or(|least| *least > IDENTIFIED_BY_ERRORS);
+    let again = match before.filter(|before| !has_families && is_determined(&before.rank)) {
+        Some(before) => Some(rank_at(problem, &in_sizes(problem, &before.beta))?),
+        None => None,
+    };
+    let (rank, linearised) = match again.filter(|(rank, _)| is_determined(rank)) {
+        Some(again) => again,
+        None => rank_at_nominal(problem)?,
+    };
+    let mut found = minimum_of_rank(problem, rank, linearised, start)?;
     for _ in 0..MAX_RANKS {
         let is_full = found.rank.null_space.ncols() == 0;
         if is_full || has_families {
@@ -250,13 +264,7 @@ fn freedom(problem: &Problem, rank: &Rank) -> usize {
 /// families determine their coefficients, so the rank is that of the other parameters, and their linearisation is not
 /// computed: there may be hundreds of them.
 fn rank_at_nominal(problem: &Problem) -> Result<(Rank, (Vec<f64>, Vec<Triangle>)), IdentifyError> {
-    let decided = |problem: &Problem| {
-        let nominal = vec![0.0; problem.parameters.list.len()];
-        let triangles = problem.triangles(&nominal)?;
-        let whole = problem.prior_triangle(&nominal).merged(&triangles);
-        let rank = problem.parameters.rank(&whole)?;
-        Ok::<_, IdentifyError>((rank, (nominal, triangles)))
-    };
+    let decided = |problem: &Problem| rank_at(problem, &vec![0.0; problem.parameters.list.len()]);
     if families::families(&problem.parameters).is_empty() {
         return decided(problem);
     }
@@ -270,6 +278,18 @@ fn rank_at_nominal(problem: &Problem) -> Result<(Rank, (Vec<f64>, Vec<Triangle>)
     Ok((rank.among(&kept, &problem.parameters.sizes(), least), (Vec::new(), Vec::new())))
 }
 
+/// Parameters as multiples of their physical sizes, in which the iterations go on: equal but for the last digit.
+fn in_sizes(problem: &Problem, beta: &[f64]) -> Vec<f64> {
+    beta.iter().zip(problem.parameters.sizes()).map(|(beta, size)| beta / size * size).collect()
+}
+
+/// The rank at some parameters, and the linearisation there.
+fn rank_at(problem: &Problem, beta: &[f64]) -> Result<(Rank, (Vec<f64>, Vec<Triangle>)), IdentifyError> {
+    let triangles = problem.triangles(beta)?;
+    let whole = problem.prior_triangle(beta).merged(&triangles);
+    Ok((problem.parameters.rank(&whole)?, (beta.to_vec(), triangles)))
+}
+
 /// The parameters with each combination that is not identifiable at its nominal value.
 fn identifiable(problem: &Problem, beta: &[f64]) -> Result<Vec<f64>, IdentifyError> {
     let (rank, _) = rank_at_nominal(problem)?;
@@ -281,8 +301,7 @@ fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, IdentifyError> {
     let Minimum { beta, triangles, rank } = minimum;
     let whole = problem.prior_triangle(&beta).merged(&triangles);
     let covariance = whole.covariance(&rank.identifiable_basis)?;
-    let residuals = problem.residuals(&beta);
-    let held_out = held_out(problem, &beta, &triangles, &whole, &rank.identifiable_basis)?;
+    let (residuals, held_out) = held_out(problem, &beta, &triangles, &whole, &rank.identifiable_basis)?;
     // The inflation of the likelihood is no noise: readings count with the noise, priors as they are.
     let (penalised, of_priors) = (whole.sum_of_squares(), problem.prior_triangle(&beta).sum_of_squares());
     let chi_square = penalised + (problem.noise.inflation - 1.0) * (penalised - of_priors);

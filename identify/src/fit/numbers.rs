@@ -27,7 +27,7 @@
 
 use abbe_model::session::Prior;
 
-use super::{Fit, fit, minimum, positions};
+use super::{Fit, finish, fit, minimum, minimum_beside, positions};
 use crate::error::IdentifyError;
 use crate::numerics::tails::QUANTILE_95;
 use crate::parameters::Role;
@@ -66,15 +66,16 @@ pub struct NumberInterval {
     pub covered: [(f64, Vec<f64>); 2],
 }
 
-/// As [`fit`], with the estimated numbers and positions of shapes moved to their best values in the problem.
+/// As [`fit`], with the estimated numbers and positions of shapes moved to their best values in the problem. `before` is the
+/// fit with other noise and outliers.
 ///
 /// # Errors
 /// As [`fit`].
-pub(crate) fn fit_with_numbers(problem: &mut Problem, start: Option<&[f64]>) -> Result<Fit, IdentifyError> {
-    let mut found = at_positions(problem, start)?;
+pub(crate) fn fit_with_numbers(problem: &mut Problem, before: Option<&Fit>) -> Result<Fit, IdentifyError> {
+    let mut found = at_positions(problem, before.map(|before| before.beta.as_slice()), before)?;
     for _ in 0..MAX_MOVES {
         let Some((mut moved, from)) = positions::moved(problem, &found.beta)? else { break };
-        let next = at_positions(&mut moved, Some(&from))?;
+        let next = at_positions(&mut moved, Some(&from), None)?;
         if moved.sum_of_squares(&next.beta) >= problem.sum_of_squares(&found.beta) {
             break;
         }
@@ -85,9 +86,9 @@ pub(crate) fn fit_with_numbers(problem: &mut Problem, start: Option<&[f64]>) -> 
 }
 
 /// The fit with the positions that the shapes have.
-fn at_positions(problem: &mut Problem, start: Option<&[f64]>) -> Result<Fit, IdentifyError> {
+fn at_positions(problem: &mut Problem, start: Option<&[f64]>, before: Option<&Fit>) -> Result<Fit, IdentifyError> {
     if !problem.parameters.has_numbers() {
-        return fit(problem, start);
+        return finish(problem, minimum_beside(problem, start, before)?);
     }
     let start = match start {
         Some(beta) => beta.to_vec(),

@@ -57,7 +57,7 @@ pub fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> Result<
 /// # Errors
 /// If the iterations do not converge.
 pub fn refit(problem: &mut Problem, present: &Fit) -> Result<Fit, IdentifyError> {
-    let mut fit = fit_with_numbers(problem, Some(&present.beta))?;
+    let mut fit = fit_with_numbers(problem, Some(present))?;
     fit.intervals = intervals(problem, &fit)?;
     fit.positions = positions::at_solution(problem, &fit)?;
     fit.further_steps = further_steps::at_solution(problem, &fit)?;
@@ -182,7 +182,7 @@ fn settled(mut problem: Problem, floor: f64) -> Result<(Problem, Fit), IdentifyE
             break;
         }
         problem.noise = noise;
-        let found = fit_with_numbers(&mut problem, Some(&fit.beta));
+        let found = fit_with_numbers(&mut problem, Some(&fit));
         fit = plausibility::checked(&problem, found)?;
     }
     Ok((problem, fit))

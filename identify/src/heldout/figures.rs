@@ -60,7 +60,7 @@ fn interpolated(problem: &Problem, fit: &Fit) -> Result<Option<Vec<Vec<f64>>>, I
     let problem = problem.with_folds((**folds).clone());
     let triangles = problem.triangles(&fit.beta)?;
     let whole = problem.prior_triangle(&fit.beta).merged(&triangles);
-    Ok(Some(held_out(&problem, &fit.beta, &triangles, &whole, &fit.rank.identifiable_basis)?.residuals))
+    Ok(Some(held_out(&problem, &fit.beta, &triangles, &whole, &fit.rank.identifiable_basis)?.1.residuals))
 }
 
 /// The names of the tests that were left out.

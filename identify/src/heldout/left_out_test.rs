@@ -102,7 +102,7 @@ pub fn left_out_tests(problem: &Problem, beta: &[f64]) -> Result<LeftOutTests, I
     }
     let zero = vec![0.0; beta.len()];
     let of_test: Vec<Vec<f64>> = steps.iter().map(|step| step.clone().unwrap_or_else(|| zero.clone())).collect();
-    let residuals = predicted(&problem, beta, &of_test)?;
+    let (_, residuals) = predicted(&problem, beta, &of_test)?;
     let judged = residuals.into_iter().zip(&steps).map(|(residual, step)| step.as_ref().map(|_| residual));
     Ok(LeftOutTests { residuals: judged.collect(), not_left_out })
 }

@@ -4,10 +4,9 @@
 //! partial autocorrelations `κ` lie between −1 and 1. In short runs the likelihood is flat towards a random walk, so `κ₁` is
 //! the mean of its posterior with a uniform prior. Its maximum would often lie at the bound.
 
-use abbe_model::session::Test;
-
 use super::PureError;
 use super::restricted::{DetrendedRuns, MAX_ORDER, Predictions};
+use super::waves::AlongRuns;
 use crate::numerics::golden_section::highest;
 use crate::problem::Problem;
 
@@ -55,49 +54,34 @@ pub fn along_runs(problem: &Problem, residuals: &[Vec<f64>]) -> Option<(PureErro
         return None;
     }
     let kept = |test: usize, row: usize| !problem.rejected[test][row];
-    let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
-    let shown = pure.autocorrelation(problem.session.stated_noise_mm(), &problem.tests, kept)?;
-    Some((pure, shown))
+    let along = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
+    let shown = along.autocorrelation(problem.session.stated_noise_mm())?;
+    Some((along.pure, shown))
 }
 
-impl PureError {
+impl AlongRuns {
     /// Autocorrelation along runs. The order is the least one, up to three, whose successor is insignificant. `None`
     /// without enough repeats. With a stated standard deviation, mm, that the repeats do not contradict, the coefficients
     /// are those of noise of this standard deviation.
-    pub fn autocorrelation(
-        &self,
-        stated_mm: Option<f64>,
-        tests: &[Test],
-        kept: impl Fn(usize, usize) -> bool + Sync,
-    ) -> Option<Autocorrelation> {
-        let runs = DetrendedRuns::of(self, tests, kept, MAX_ORDER)?;
+    pub fn autocorrelation(&self, stated_mm: Option<f64>) -> Option<Autocorrelation> {
+        let runs = self.runs.as_ref()?;
         Some(runs.autocorrelation(&runs.estimate(MAX_ORDER, stated_mm)))
     }
 
     /// Equally probable processes, of first order if no coefficient is significant. `None` and `stated_mm` as for
-    /// [`PureError::autocorrelation`].
-    pub fn possible_processes(
-        &self,
-        stated_mm: Option<f64>,
-        tests: &[Test],
-        kept: impl Fn(usize, usize) -> bool + Sync,
-    ) -> Option<Vec<Process>> {
-        let runs = DetrendedRuns::of(self, tests, kept, MAX_ORDER)?;
+    /// [`AlongRuns::autocorrelation`].
+    pub fn possible_processes(&self, stated_mm: Option<f64>) -> Option<Vec<Process>> {
+        let runs = self.runs.as_ref()?;
         Some(runs.possible_processes(&runs.estimate(MAX_ORDER, stated_mm)))
-    }
-
-    /// The coefficients of at most first order.
-    pub(super) fn coefficients_of_first_order(
-        &self,
-        tests: &[Test],
-        kept: impl Fn(usize, usize) -> bool + Sync,
-    ) -> Option<Vec<f64>> {
-        let runs = DetrendedRuns::of(self, tests, kept, 1)?;
-        Some(runs.autocorrelation(&runs.estimate(1, None)).process.coefficients)
     }
 }
 
 impl DetrendedRuns {
+    /// The coefficients of at most first order.
+    pub fn coefficients_of_first_order(&self) -> Vec<f64> {
+        self.autocorrelation(&self.estimate(1, None)).process.coefficients
+    }
+
     /// The partial autocorrelations with the greatest likelihood, up to the last significant order.
     fn estimate(&self, most: usize, stated_mm: Option<f64>) -> Estimate {
         let free = self.best(&[0.0], 0, None);

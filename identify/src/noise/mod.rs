@@ -30,6 +30,7 @@ pub use autocorrelation::{Autocorrelation, Process, along_runs};
 pub(crate) use stated::silent_channels;
 pub use stated::stated_against_repeats;
 use trends::Trends;
+pub use waves::AlongRuns;
 
 /// The noise of one scalar reading.
 #[derive(Clone, Debug, PartialEq)]

@@ -27,6 +27,7 @@ use std::collections::hash_map::Entry;
 use std::ops::{Add, AddAssign, Range};
 
 use abbe_model::session::Test;
+use faer::Mat;
 use nalgebra::{SMatrix, SVector};
 
 use super::PureError;
@@ -92,18 +93,13 @@ struct FitOfRuns {
 }
 
 impl DetrendedRuns {
-    /// For processes of at most this order. `None` without enough pairs of deviations, and for readings of several
+    /// For processes of at most third order. `None` without enough pairs of deviations, and for readings of several
     /// channels.
-    pub fn of(
-        pure: &PureError,
-        tests: &[Test],
-        kept: impl Fn(usize, usize) -> bool + Sync,
-        order: usize,
-    ) -> Option<DetrendedRuns> {
+    pub fn of(pure: &PureError, tests: &[Test], kept: impl Fn(usize, usize) -> bool + Sync) -> Option<DetrendedRuns> {
         if tests.iter().any(|test| test.readings.as_ref().is_none_or(|readings| readings.channels != 1)) {
             return None;
         }
-        let of_tests = parallel::map(tests.len(), &|number| AlikeRuns::of_test(pure, number, tests, &kept, order));
+        let of_tests = parallel::map(tests.len(), &|number| AlikeRuns::of_test(pure, number, tests, &kept));
         let pairs: usize = of_tests.iter().map(|(_, pairs)| pairs).sum();
         let mut alike: Vec<AlikeRuns> = of_tests.into_iter().flat_map(|(alike, _)| alike).collect();
         alike.retain(|alike| alike.freedom > 0.5 && alike.independent > 0.0);
@@ -136,7 +132,6 @@ impl AlikeRuns {
         number: usize,
         tests: &[Test],
         kept: impl Fn(usize, usize) -> bool,
-        order: usize,
     ) -> (Vec<AlikeRuns>, usize) {
         let Some(readings) = &tests[number].readings else { return (Vec::new(), 0) };
         let trends = Trends::of(readings, |row| kept(number, row));
@@ -165,7 +160,7 @@ impl AlikeRuns {
         }
         let mut alike = parallel::map(alike.len(), &|place| {
             let (stretches, trend, runs) = &alike[place];
-            AlikeRuns::of(stretches, trend, runs, order)
+            AlikeRuns::of(stretches, trend, runs)
         });
         let freedom: f64 = alike.iter().map(|alike| alike.freedom * alike.runs as f64).sum();
         let independent = (pure.freedom_of_tests[number] / freedom.max(f64::MIN_POSITIVE)).min(1.0);
@@ -175,7 +170,7 @@ impl AlikeRuns {
 
     /// From the places of uninterrupted deviations, the orthonormal terms of the trend at each place, zero for missing
     /// terms, and the deviations of each run, mm.
-    fn of(stretches: &[Range<usize>], trend: &[[f64; TERMS]], runs: &[Vec<f64>], order: usize) -> AlikeRuns {
+    fn of(stretches: &[Range<usize>], trend: &[[f64; TERMS]], runs: &[Vec<f64>]) -> AlikeRuns {
         let mut places = [0; MAX_ORDER + 1];
         let mut of_length: [Vec<Range<usize>>; MAX_ORDER + 1] = Default::default();
         for stretch in stretches.iter().filter(|stretch| !stretch.is_empty()) {
@@ -184,21 +179,28 @@ impl AlikeRuns {
             of_length[(stretch.len() - 1).min(MAX_ORDER)].push(stretch.clone());
         }
         let q: Vec<SVector<f64, TERMS>> = trend.iter().map(|q| SVector::from(*q)).collect();
+        let terms = Mat::from_fn(q.len(), TERMS, |i, term| q[i][term]);
         let lengths = of_length.iter().enumerate().filter(|(_, stretches)| !stretches.is_empty());
         let sums = lengths.map(|(most, stretches)| {
-            let sums = LaggedStretches { stretches, order: order.min(most) };
+            let sums = LaggedStretches { stretches, order: most };
             let of_runs = parallel::map(runs.len(), &|run| {
                 let d = &runs[run];
-                (sums.of(|i, j| d[i] * d[j]), sums.of(|i, j| q[i] * d[j]))
+                let (square, along) = (|i: usize, j: usize| d[i] * d[j], |i: usize, j: usize| q[i] * d[j]);
+                (sums.of(square, one_by_one(square)), sums.of(along, one_by_one(along)))
             });
             let mut squares = vec![0.0; of_runs.first().map_or(0, |(squares, _)| squares.len())];
             for (of_run, _) in &of_runs {
                 squares.iter_mut().zip(of_run).for_each(|(sum, of_run)| *sum += of_run);
             }
-            let trend = sums.of(|i, j| {
-                let mut products = SVector::<f64, PAIRS>::zeros();
-                pairs().zip(products.iter_mut()).for_each(|((s, t), product)| *product = q[i][s] * q[j][t]);
-                products
+            let product =
+                |i: usize, j: usize| SVector::<f64, PAIRS>::from_iterator(pairs().map(|(s, t)| q[i][s] * q[j][t]));
+            // A run with an outlier has terms of its own, so that these are most of the products.
+            let trend = sums.of(product, |stretch, lag| {
+                let count = stretch.len() - lag;
+                let later = terms.subrows(stretch.start + lag, count);
+                let products = later.transpose() * terms.subrows(stretch.start, count);
+                let both = |s: usize, t: usize| products[(s, t)] + if lag == 0 { 0.0 } else { products[(t, s)] };
+                SVector::from_iterator(pairs().map(|(s, t)| both(s, t)))
             });
             LaggedSums { most, trend, squares, along: of_runs.into_iter().flat_map(|(_, along)| along).collect() }
         });
@@ -253,31 +255,44 @@ struct LaggedStretches<'s> {
 
 impl LaggedStretches<'_> {
     /// The sums of `product(i, j) + product(j, i)`, for `i = j` of `product(i, i)`, in the order of [`Predictions::weights`].
-    fn of<T>(&self, product: impl Fn(usize, usize) -> T) -> Vec<T>
-    where
-        T: Copy + Default + Add<Output = T> + AddAssign,
-    {
-        let both =
-            |i: usize, lag: usize| if lag == 0 { product(i, i) } else { product(i, i - lag) + product(i - lag, i) };
+    /// `lagged` gives the sum over a whole stretch at a lag.
+    fn of<T: Summand>(
+        &self,
+        product: impl Fn(usize, usize) -> T,
+        lagged: impl Fn(&Range<usize>, usize) -> T,
+    ) -> Vec<T> {
         let mut sums = Vec::new();
         for level in 0..=self.order {
-            let mut lagged = T::default();
-            for stretch in self.stretches {
-                for i in stretch.start + level..stretch.end {
-                    lagged += both(i, level);
-                }
-            }
-            sums.push(lagged);
+            sums.push(sum(self.stretches.iter().map(|stretch| lagged(stretch, level))));
             for lag in 0..level {
-                let mut ends = T::default();
-                for Range { start, end } in self.stretches {
-                    ends += both(start + level - 1, lag) + both(end + lag - level, lag);
-                }
-                sums.push(ends);
+                let ends = self.stretches.iter().map(|Range { start, end }| {
+                    both(&product, start + level - 1, lag) + both(&product, end + lag - level, lag)
+                });
+                sums.push(sum(ends));
             }
         }
         sums
     }
+}
+
+/// What lagged products are.
+trait Summand: Copy + Default + Add<Output = Self> + AddAssign {}
+
+impl<T: Copy + Default + Add<Output = T> + AddAssign> Summand for T {}
+
+fn sum<T: Summand>(terms: impl Iterator<Item = T>) -> T {
+    let mut sum = T::default();
+    terms.for_each(|term| sum += term);
+    sum
+}
+
+fn both<T: Summand>(product: &impl Fn(usize, usize) -> T, i: usize, lag: usize) -> T {
+    if lag == 0 { product(i, i) } else { product(i, i - lag) + product(i - lag, i) }
+}
+
+/// The sum of a product over a stretch at a lag.
+fn one_by_one<T: Summand>(product: impl Fn(usize, usize) -> T) -> impl Fn(&Range<usize>, usize) -> T {
+    move |stretch, lag| sum((stretch.start + lag..stretch.end).map(|i| both(&product, i, lag)))
 }
 
 /// The predictions of a value of a process of unit variance from values before it.
@@ -351,7 +366,7 @@ pub(super) mod tests {
         pub fn independent(runs: Vec<Vec<f64>>) -> DetrendedRuns {
             let alike = runs.into_iter().map(|run| {
                 let n = run.len();
-                AlikeRuns::of(std::slice::from_ref(&(0..n)), &trend(n), &[run], MAX_ORDER)
+                AlikeRuns::of(std::slice::from_ref(&(0..n)), &trend(n), &[run])
             });
             DetrendedRuns { alike: alike.collect() }
         }
@@ -445,7 +460,7 @@ pub(super) mod tests {
                 minus_two_ln += ln_determinant + (d.transpose() * &inverse * &d)[(0, 0)] / 0.49;
                 freedom += (n - first) as f64;
             }
-            alike.push(AlikeRuns::of(&stretches(&rows), &q, &runs, MAX_ORDER));
+            alike.push(AlikeRuns::of(&stretches(&rows), &q, &runs));
         }
         minus_two_ln += freedom * 0.49_f64.ln();
         let fitted = DetrendedRuns { alike }.fit(partials, Some(0.7));

@@ -11,6 +11,7 @@ use faer::Mat;
 use statrs::function::gamma::gamma_ur;
 
 use super::PureError;
+use super::restricted::DetrendedRuns;
 use super::trends::MIN_RUN;
 use crate::numerics::{median, parallel};
 
@@ -31,13 +32,21 @@ struct RunRows {
     rows: Range<usize>,
 }
 
+/// Deviations of repeats along runs, without waves.
+pub struct AlongRuns {
+    /// The deviations.
+    pub pure: PureError,
+    /// The sums that the likelihood of their autoregression needs; `None` without enough repeats.
+    pub(super) runs: Option<DetrendedRuns>,
+}
+
 impl PureError {
     /// Removes waves along runs that no autocorrelation explains: they vary from run to run, so they are structure that
     /// would count as noise. A band is removed from all tests or from one. The criterion is the periodogram of the
     /// whitened deviations, summed over runs, against the median of all ordinates.
-    pub fn without_waves(mut self, tests: &[Test], kept: impl Fn(usize, usize) -> bool + Sync) -> PureError {
-        let Some(coefficients) = self.coefficients_of_first_order(tests, &kept) else {
-            return self;
+    pub fn without_waves(mut self, tests: &[Test], kept: impl Fn(usize, usize) -> bool + Sync) -> AlongRuns {
+        let Some(mut detrended) = DetrendedRuns::of(&self, tests, &kept) else {
+            return AlongRuns { pure: self, runs: None };
         };
         let runs: Vec<RunRows> = tests
             .iter()
@@ -50,7 +59,7 @@ impl PureError {
             .collect();
         let of_test =
             |test: usize| runs.partition_point(|run| run.test < test)..runs.partition_point(|run| run.test <= test);
-        let mut ordinates = self.ordinates(&runs, &coefficients);
+        let mut ordinates = self.ordinates(&runs, &detrended.coefficients_of_first_order());
         for range in std::iter::once(0..runs.len()).chain((0..tests.len()).map(of_test)) {
             for _ in 0..MAX_BANDS {
                 let Some(band) = self.band(&ordinates[range.clone()]) else {
@@ -71,13 +80,14 @@ impl PureError {
                 }
                 self.freedom_of_tests.iter_mut().for_each(|freedom| *freedom = freedom.max(0.0));
                 self.count();
-                let Some(coefficients) = self.coefficients_of_first_order(tests, &kept) else {
-                    return self;
+                let Some(rest) = DetrendedRuns::of(&self, tests, &kept) else {
+                    return AlongRuns { pure: self, runs: None };
                 };
-                ordinates = self.ordinates(&runs, &coefficients);
+                detrended = rest;
+                ordinates = self.ordinates(&runs, &detrended.coefficients_of_first_order());
             }
         }
-        self
+        AlongRuns { pure: self, runs: Some(detrended) }
     }
 
     /// The ordinates of the whitened deviations of each run ([`ordinates`]).

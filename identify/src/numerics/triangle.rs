@@ -30,7 +30,7 @@ impl Triangle {
     /// The factor of some rows of `[J | r]`.
     pub fn of(rows: Mat<f64>) -> Self {
         let mut triangle = Triangle::new(rows.ncols() - 1);
-        triangle.absorb(rows.as_ref());
+        triangle.absorb(rows);
         triangle
     }
 
@@ -40,12 +40,14 @@ impl Triangle {
     }
 
     /// Absorbs rows: `block` is rows × (parameters + 1), residuals in the last column.
-    pub fn absorb(&mut self, block: MatRef<'_, f64>) {
+    pub fn absorb(&mut self, block: Mat<f64>) {
         if block.nrows() == 0 {
             return;
         }
         let kept = self.factor.nrows();
         let width = self.columns + 1;
+        // A large block is reduced in its place, so that no row is copied.
+        let block = if block.nrows() > 2 * width { upper(block) } else { block };
         // Small blocks (folds of many tests) are collected until they are twice as many as the columns, then reduced
         // together. The factor grows by doubling, so that a block does not copy those before it.
         if kept + block.nrows() <= 2 * width {
@@ -53,12 +55,12 @@ impl Triangle {
                 self.factor.reserve((kept + block.nrows()).max((2 * kept).min(2 * width)), width);
             }
             self.factor.resize_with(kept + block.nrows(), width, |_, _| 0.0);
-            self.factor.get_mut(kept.., ..).copy_from(block);
+            self.factor.get_mut(kept.., ..).copy_from(&block);
             return;
         }
         let mut stacked = Mat::zeros(kept + block.nrows(), width);
         stacked.get_mut(..kept, ..).copy_from(&self.factor);
-        stacked.get_mut(kept.., ..).copy_from(block);
+        stacked.get_mut(kept.., ..).copy_from(&block);
         self.factor = upper(stacked);
     }
 
@@ -69,7 +71,7 @@ impl Triangle {
 
     /// Absorbs the rows of another factor.
     pub fn merge(&mut self, other: &Triangle) {
-        self.absorb(other.factor.as_ref());
+        self.absorb(other.factor.clone());
     }
 
     /// This factor with others merged into it.

@@ -75,20 +75,19 @@ impl Problem {
             let kept = self.kept_rows(block);
             let folds: Vec<usize> = self.folds_of(&kept, block).collect();
             let white = self.whitened(rows, &kept);
+            let Some(first) = folds.first() else { continue };
+            let none = || S::new(self.test_parameters[block.test].parameters.len());
+            if folds.iter().all(|fold| fold == first) {
+                sums.entry((block.test, *first)).or_insert_with(none).absorb(white);
+                continue;
+            }
             let mut present = folds.clone();
-            present.dedup();
             present.sort_unstable();
             present.dedup();
-            for fold in &present {
-                let sum = sums
-                    .entry((block.test, *fold))
-                    .or_insert_with(|| S::new(self.test_parameters[block.test].parameters.len()));
-                if present.len() == 1 {
-                    sum.absorb(white.as_ref());
-                } else {
-                    let chosen: Vec<usize> = (0..folds.len()).filter(|i| folds[*i] == *fold).collect();
-                    sum.absorb(Mat::from_fn(chosen.len(), white.ncols(), |i, j| white[(chosen[i], j)]).as_ref());
-                }
+            for fold in present {
+                let chosen: Vec<usize> = (0..folds.len()).filter(|i| folds[*i] == fold).collect();
+                let rows = Mat::from_fn(chosen.len(), white.ncols(), |i, j| white[(chosen[i], j)]);
+                sums.entry((block.test, fold)).or_insert_with(none).absorb(rows);
             }
         }
         Ok(sums)

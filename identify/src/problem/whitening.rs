@@ -80,22 +80,26 @@ impl Problem {
         let inflation = self.noise.inflation.sqrt();
         let innovation = 1.0 / (self.noise.innovation_mm() * inflation);
         let marginal = 1.0 / self.noise.likelihood_mm();
-        if ar_coefficients.is_empty() && kept.len() == rows.nrows() {
-            rows *= faer::Scale(innovation);
-            return rows;
-        }
-        let mut white = Mat::zeros(kept.len(), rows.ncols());
-        for (mut white, column) in white.col_iter_mut().zip(rows.col_iter()) {
-            for (k, &i) in kept.iter().enumerate() {
-                white[k] = if i < ar_coefficients.len() {
-                    column[i] * marginal
-                } else {
+        let past = ar_coefficients.len().min(rows.nrows());
+        for column in rows.col_iter_mut().filter_map(|column| Some(column.try_as_col_major_mut()?.as_slice_mut())) {
+            if past > 0 {
+                // From the last row on, so that the rows before it are not whitened yet.
+                for i in (past..column.len()).rev() {
                     let lags = ar_coefficients.iter().enumerate();
-                    let past: f64 = lags.map(|(lag, a)| a * column[i - lag - 1]).sum();
-                    (column[i] - past) * innovation
-                };
+                    column[i] -= lags.map(|(lag, a)| a * column[i - lag - 1]).sum::<f64>();
+                }
+            }
+            column[past..].iter_mut().for_each(|value| *value *= innovation);
+            column[..past].iter_mut().for_each(|value| *value *= marginal);
+            if kept.len() < column.len() {
+                let mut next = 0;
+                for stretch in kept.chunk_by(|a, b| a + 1 == *b) {
+                    column.copy_within(stretch[0]..stretch[0] + stretch.len(), next);
+                    next += stretch.len();
+                }
             }
         }
-        white
+        rows.truncate(kept.len(), rows.ncols());
+        rows
     }
 }
