@@ -66,6 +66,8 @@ TRACES = [
 HERMLE, VOLUMETRIC = "sessions/hermle-c600u", "sessions/volumetric"
 # Description, arguments, targets as above.
 COMMANDS = [
+    ("`fit` of 99,044 readings", ["fit", "{folder}/nothing-100000/session.toml"], None, None, None),
+    ("`fit` of 990,044 readings", ["fit", "{folder}/nothing-1000000/session.toml"], None, None, 1.7),
     ("`trace sessions/ur10/session.toml`, 11,911 poses", ["trace", "sessions/ur10/session.toml", "--data", str(DATA)], 20, None, 1.7),
     ("`plan chapter5.toml --improve 2`", ["plan", f"{HERMLE}/chapter5.toml", "--improve", "2"], 3, None, 1.7),
     ("`fit --monte-carlo 10000` of the measured session", ["fit", f"{HERMLE}/measured/session.toml", "--monte-carlo", "10000"], None, None, 1.7),

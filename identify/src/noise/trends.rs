@@ -140,21 +140,24 @@ impl Trends {
     }
 
     /// Contribution of a group of repeats to the trace of `M·P`: `Σ_t P_tt − (1/R)·Σ_ts P_ts` over its R rows. `P_ts`
-    /// is `δ_ts − Σ_i q_ti q_si` for rows of one run, and `δ_ts` for others.
+    /// is `δ_ts − Σ_i q_ti q_si` for rows of one run, and `δ_ts` for others. The rows are in ascending order.
     pub fn freedom_of(&self, group: &[usize]) -> f64 {
         let repeats = group.len() as f64;
-        let mut own = 0.0;
+        let square = |terms: &[f64; TERMS]| terms.iter().map(|q| q * q).sum::<f64>();
         // The trends' part of Σ_ts: for each run, the squared norm of the sum of its rows' terms.
-        let mut sums: BTreeMap<Option<usize>, [f64; TERMS]> = BTreeMap::new();
+        let (mut own, mut of_trends) = (0.0, 0.0);
+        let (mut run, mut sum) = (None, [0.0; TERMS]);
         for row in group {
             let run_of_row = self.run(*row);
             let terms = run_of_row.map_or([0.0; TERMS], |run| self.terms_in(run, *row));
-            own += terms.iter().map(|q| q * q).sum::<f64>();
-            let sum = sums.entry(run_of_row).or_insert([0.0; TERMS]);
+            own += square(&terms);
+            if run_of_row != run {
+                of_trends += square(&std::mem::replace(&mut sum, [0.0; TERMS]));
+                run = run_of_row;
+            }
             sum.iter_mut().zip(&terms).for_each(|(sum, q)| *sum += q);
         }
-        let of_trends: f64 = sums.values().flatten().map(|q| q * q).sum();
-        (repeats - own) - (repeats - of_trends) / repeats
+        (repeats - own) - (repeats - of_trends - square(&sum)) / repeats
     }
 }
 

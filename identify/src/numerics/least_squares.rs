@@ -7,8 +7,8 @@
 //!
 //! The iterations end where the undamped step would lower the sum of squares by a negligible share of its mean over the
 //! degrees of freedom, `‖R·D·η‖² < ε · ‖r‖²/ν`: the parameters are then `√ε` standard uncertainties from the minimum,
-//! whatever noise is assumed. Full steps shrink at least in the ratio of the last two, which tells of the step after the
-//! present one that it is negligible, without a linearisation there.
+//! whatever noise is assumed. That the steps so far shrink fast says nothing of the next one: a direction along which they
+//! shrink slowly may have been small beside the others.
 //!
 //! Along a direction that the readings hardly determine, the neglected second derivatives may be nearly as large as
 //! `JᵀJ`. Each full step is then `q` times the step before with `q` close to 1, or close to −1 if it goes too far. The sum
@@ -62,7 +62,7 @@ const MAX_ITERATIONS: usize = 1000;
 /// Attempts to find a damping with which a step lowers the sum of squares.
 const MAX_ATTEMPTS: usize = 30;
 /// Predicted decrease of the sum of squares, as a share of its mean, at which the iterations end: 10⁻¹⁰ standard
-/// uncertainties. This step or the one before it is the last.
+/// uncertainties. One more step follows.
 const CONVERGED: f64 = 1e-20;
 /// The same for steps that do not end within [`MAX_ITERATIONS`]: a hundredth of a standard uncertainty.
 const NEGLIGIBLE: f64 = 1e-4;
@@ -116,8 +116,7 @@ pub fn minimise(
                 if accepted { (after(&full, 1.0), triangle.after(&step)) } else { (x.clone(), triangle.clone()) };
             LeastSquaresSolution { x, sum_of_squares: triangle.sum_of_squares(), triangle, iterations: iteration }
         };
-        let ratio = before.as_ref().map_or(1.0, |(_, before)| (predicted / before).min(1.0));
-        if predicted * ratio <= CONVERGED * mean {
+        if predicted <= CONVERGED * mean {
             return Ok(end(true));
         }
         // A decrease below the rounding of the sum cannot be seen in the sum. The minimum is reached when full steps no

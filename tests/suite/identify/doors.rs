@@ -394,6 +394,27 @@ fn positions_of_steps() {
     }
 }
 
+/// A fit and the trace of a session judge the declared model by one noise, whether it is stated, that of repeats or that of
+/// the residual.
+#[test]
+fn fit_and_trace_state_one_noise() {
+    let stated = |line: &&str| !line.starts_with("noise_um") && !line.starts_with("resolution_um");
+    for (folder, source) in [("hermle-c600u/measured", "repeats"), ("table-and-head/measured", "residual")] {
+        for (states, source) in [(true, "stated"), (false, source)] {
+            let door = Door::of(folder, "session.toml", |text| match states {
+                true => text,
+                false => text.lines().filter(stated).collect::<Vec<_>>().join("\n"),
+            });
+            let session = door.at("session.toml");
+            let fit = door.run(&["fit", text(&session)], "fit.json");
+            let trace = door.run(&["trace", text(&session), "--only", "EZC"], "trace.json");
+            let of_both = |key: &str| assert_eq!(fit[key], trace["before"][key], "{folder}, {source}: {key}");
+            ["noise_um", "chi_square", "degrees_of_freedom"].into_iter().for_each(of_both);
+            assert_eq!((&fit["noise_source"], &trace["noise_source"]), (&source.into(), &source.into()), "{folder}");
+        }
+    }
+}
+
 /// The centre and the width of a local feature are parameters with an uncertainty, whichever door one asks at.
 #[test]
 fn numbers_of_a_shape() {

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use abbe_identify::problem::Filter;
-use faer::{Mat, MatRef};
+use faer::{ColRef, Mat, MatRef};
 
 use super::Columns;
 
@@ -92,6 +92,13 @@ pub struct Adjoint<T = f64> {
 impl Adjoint {
     /// Of vectors over all whitened rows in fold order (rows × vectors), restricted to some rows.
     pub fn of(training: &TrainingRows, vectors: MatRef<'_, f64>) -> Adjoint {
+        Adjoint::beside(training, vectors, &[])
+    }
+
+    /// The same with further vectors, one column after another.
+    pub fn beside(training: &TrainingRows, vectors: MatRef<'_, f64>, others: &[MatRef<'_, f64>]) -> Adjoint {
+        let vectors: Vec<ColRef<'_, f64>> =
+            std::iter::once(vectors).chain(others.iter().copied()).flat_map(|some| some.col_iter()).collect();
         const NONE: usize = usize::MAX;
         let mut rows = Vec::new();
         let mut places: Vec<Vec<usize>> = Vec::with_capacity(training.blocks.len());
@@ -105,11 +112,11 @@ impl Adjoint {
             }
             places.push(place);
         }
-        let mut values = Mat::zeros(vectors.ncols(), rows.len());
-        let mut entries = vec![0.0; vectors.ncols()];
+        let mut values = Mat::zeros(vectors.len(), rows.len());
+        let mut entries = vec![0.0; vectors.len()];
         for (block, place) in training.blocks.iter().zip(&places) {
             for (i, row) in block.iter() {
-                entries.iter_mut().enumerate().for_each(|(j, entry)| *entry = vectors[(row, j)]);
+                entries.iter_mut().zip(&vectors).for_each(|(entry, vector)| *entry = vector[row]);
                 for (raw, factor) in training.filter.terms(i) {
                     let sums = values.col_as_slice_mut(place[raw]);
                     sums.iter_mut().zip(&entries).for_each(|(sum, entry)| *sum += factor * entry);

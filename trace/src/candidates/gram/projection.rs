@@ -105,17 +105,6 @@ fn key(set: &EffectColumns) -> (usize, usize) {
     (Arc::as_ptr(&set.basis) as usize, Arc::as_ptr(&set.channel) as usize)
 }
 
-/// The given rows of a matrix, and zeros elsewhere.
-fn restricted(matrix: MatRef<'_, f64>, training: &TrainingRows) -> Mat<f64> {
-    let mut restricted = Mat::zeros(matrix.nrows(), matrix.ncols());
-    for j in 0..matrix.ncols() {
-        for (_, row) in training.blocks.iter().flat_map(|block| block.iter()) {
-            restricted[(row, j)] = matrix[(row, j)];
-        }
-    }
-    restricted
-}
-
 impl Projection {
     /// Of some training folds.
     pub fn of(gram: &Gram<'_>, folds: &[usize]) -> Result<Projection, IdentifyError> {
@@ -227,11 +216,8 @@ impl Projection {
     /// `Wᵀ [X | y⊥]` over the training rows.
     pub fn side(&self, gram: &Gram<'_>) -> Arc<Adjoint> {
         let formed = || {
-            let rank = gram.rank();
-            let mut side = Mat::zeros(gram.residual.len(), rank + 1);
-            side.as_mut().subcols_mut(0, rank).copy_from(gram.model());
-            side.as_mut().subcols_mut(rank, 1).copy_from(&*self.residual(gram));
-            Arc::new(Adjoint::of(&self.training, side.as_ref()))
+            let residual = self.residual(gram);
+            Arc::new(Adjoint::beside(&self.training, gram.model(), &[Mat::as_ref(&residual)]))
         };
         let is_large = gram.residual.len() * (gram.rank() + 1) > gram.kept_by_projections;
         if self.left_out.is_some() || is_large { formed() } else { Arc::clone(self.side.get_or_init(formed)) }
@@ -272,10 +258,13 @@ impl Projection {
     pub fn chosen(&self, gram: &Gram<'_>, candidate: usize) -> Result<Arc<ChosenEffect>, IdentifyError> {
         let set = gram.set(candidate);
         stored(&self.chosen, &key(set), || {
-            let mut all = Mat::zeros(gram.columns.rows(), set.count);
-            gram.columns.fill(&[set], all.as_mut());
-            let lengths = all.col_iter().map(|column| column.norm_l2()).collect();
-            let mut rows = restricted(all.as_ref(), &self.training);
+            let mut rows = Mat::zeros(gram.columns.rows(), set.count);
+            gram.columns.fill(&[set], rows.as_mut());
+            let lengths = rows.col_iter().map(|column| column.norm_l2()).collect();
+            for (_, of_fold) in gram.columns.fold_rows.iter().enumerate().filter(|(fold, _)| !self.folds.contains(fold))
+            {
+                rows.as_mut().subrows_mut(of_fold.start, of_fold.len()).fill(0.0);
+            }
             let of_model = &self.inverse * transposed_product(gram.model(), rows.as_ref());
             let with_residual =
                 transposed_product(rows.as_ref(), Mat::as_ref(&self.residual(gram))).col(0).iter().copied().collect();
