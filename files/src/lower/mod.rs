@@ -23,6 +23,7 @@ use abbe_model::error::Location;
 use abbe_model::instrument::{InstrumentKind, InstrumentParameter, kinds};
 use abbe_model::session::expression::Constant;
 use abbe_model::session::{self, Session, Test};
+use rayon::prelude::*;
 
 use crate::access::ReadOptions;
 use crate::check;
@@ -51,7 +52,7 @@ pub(crate) struct Surroundings<'a> {
     /// The readings.
     pub data: Data<'a>,
     /// The place of a key: the table, the item if it is a list, and the keys in it.
-    pub place: &'a dyn Fn(&[&str], Option<usize>, &[&str]) -> Location,
+    pub place: &'a (dyn Fn(&[&str], Option<usize>, &[&str]) -> Location + Sync),
 }
 
 /// Context of the session for tests and effects.
@@ -68,7 +69,7 @@ struct Context<'a> {
     columns: Option<Vec<ColumnMapping>>,
     data: Data<'a>,
     options: &'a ReadOptions,
-    place: &'a dyn Fn(&[&str], Option<usize>, &[&str]) -> Location,
+    place: &'a (dyn Fn(&[&str], Option<usize>, &[&str]) -> Location + Sync),
 }
 
 /// What was found while the tests were read, beside the tests.
@@ -155,10 +156,18 @@ pub(crate) fn add(session: &mut Session, document: Parts<'_>, surroundings: &Sur
     };
     let mut declared = declared(session);
     let mut tests = session.tests.clone();
-    for (item, document) in document.test.iter().enumerate() {
+    // Their data files are read side by side. Errors and warnings are in the order of the tests.
+    let read = document.test.par_iter().enumerate().map(|(item, document)| {
+        let mut found = Found::default();
+        test::tests(&context, item, document, &mut found).map(|parts| (parts, found))
+    });
+    let read: Vec<Result<_, Fault>> = read.collect();
+    for ((item, document), read) in document.test.iter().enumerate().zip(read) {
         let others = declared.iter().map(|test| test.name.as_str());
         check::name(&document.name, others).within("name").within_item(item).within("test")?;
-        let parts = test::tests(&context, item, document, &mut found).within_item(item).within("test")?;
+        let (parts, of_test) = read.within_item(item).within("test")?;
+        found.warnings.extend(of_test.warnings);
+        found.stamps.extend(of_test.stamps);
         declared.push(Declared {
             name: document.name.clone(),
             parts: parts.iter().map(|test| test.name.clone()).collect(),
