@@ -71,7 +71,8 @@ pub fn stated_rms_mm(problem: &Problem, residuals: &[Vec<f64>]) -> f64 {
     }
 }
 
-/// The residuals of every test, mm, and those with each fold held out in turn. `beta` is the fit of all readings, `triangles` are the factors of the folds there,
+/// The residuals of every test, mm, and those with each fold held out in turn. `beta` is the fit of all readings, `triangles`
+/// are the factors of the folds there,
 /// `whole` is the factor of all readings and priors, `basis` spans the identifiable directions (parameters × rank).
 ///
 /// # Errors

@@ -46,8 +46,8 @@ impl Triangle {
         }
         let kept = self.factor.nrows();
         let width = self.columns + 1;
-        // A large block is reduced in its place, so that no row is copied.
-        let block = if block.nrows() > 2 * width { upper(block) } else { block };
+        // A high block is reduced in its place, so that no row is copied.
+        let block = if block.nrows() > 8 * width { upper(block) } else { block };
         // Small blocks (folds of many tests) are collected until they are twice as many as the columns, then reduced
         // together. The factor grows by doubling, so that a block does not copy those before it.
         if kept + block.nrows() <= 2 * width {
