@@ -185,13 +185,11 @@ export function command(folder, ...words) {
 
 /**
  * The differences of two JSON documents. A number may differ by 1e-9 of its size. A value with a standard uncertainty,
- * and a covariance, may differ by 1e-8 of that uncertainty: estimates near zero are sums of large terms. Set-ups that
- * priors alone separate (table-and-head, tilting-head) differ by 4e-9 of it.
+ * and a covariance, may differ by 1e-9 of that uncertainty: estimates near zero are sums of large terms.
  */
 export function differences(ours, theirs, path = "", scale = 0) {
   if (typeof ours === "number" && typeof theirs === "number") {
-    const most = Math.max(1e-9 * Math.abs(ours), 1e-9 * Math.abs(theirs), 1e-8 * scale);
-    const close = Math.abs(ours - theirs) <= most;
+    const close = Math.abs(ours - theirs) <= 1e-9 * Math.max(Math.abs(ours), Math.abs(theirs), scale);
     return close ? [] : [`${path}: ${ours} is not ${theirs}`];
   }
   if (typeof ours !== "object" || typeof theirs !== "object" || ours === null || theirs === null) {

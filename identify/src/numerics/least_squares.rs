@@ -68,6 +68,9 @@ const CONVERGED: f64 = 1e-20;
 const NEGLIGIBLE: f64 = 1e-4;
 /// Decrease of the sum of squares, as a share of it, that is below the rounding of the sum.
 const ROUNDING_OF_SUM: f64 = 1e-12;
+/// Rise of the sum, as a share of it, that such a step may have. The rounding of lengths of 10⁵ to 10⁶ standard deviations, in
+/// each reading, moves the sum by more than that of its terms.
+const ROUNDING_OF_RESIDUALS: f64 = 1e-10;
 /// Full steps of such a decrease go on as long as each predicts at most this share of the one before.
 const SHRINKING: f64 = 0.9;
 /// Relative step that is below the rounding of the readings.
@@ -145,7 +148,7 @@ pub fn minimise(
                     (trial, sum, next, is_full) = (extrapolated, further, None, false);
                 }
             }
-            if sum < current || (rounded && sum <= current * (1.0 + ROUNDING_OF_SUM)) {
+            if sum < current || (rounded && sum <= current * (1.0 + ROUNDING_OF_RESIDUALS)) {
                 damping.accepted((current - sum) / decrease(&scaled, &c, &step), &directions, rounded);
                 found = Some((trial, next, is_full.then_some((step, predicted))));
                 break;
