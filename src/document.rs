@@ -9,8 +9,6 @@ use abbe_identify::model_file::{InputFile, Provenance};
 use abbe_identify::problem::Problem;
 use abbe_identify::results::validation::{MovedParameter, ValidationResult};
 use abbe_identify::results::{FitResult, Statements, TraceResult, ValidationStatement};
-use abbe_model::effect::Effect;
-use abbe_model::session::Session;
 use abbe_plan::results::{Contribution, PlanAnalysis};
 use abbe_plan::{PlanStatement, attainable};
 use abbe_trace::TraceOutcome;
@@ -119,7 +117,7 @@ impl<'r> StatedFit<'r> {
     /// Of a fit.
     pub fn of_fit(problem: &Problem, result: &'r FitResult) -> Self {
         let mut statements = Statements::of_fit(problem, result);
-        statements.measure.step = attainable(&problem.session, statements.measure.step);
+        statements.measure.step = attainable(problem, statements.measure.step);
         Stated { statements, result }
     }
 }
@@ -128,9 +126,7 @@ impl<'r> StatedTrace<'r> {
     /// Of a trace.
     pub fn of_trace(trace: &'r TraceOutcome) -> Self {
         let mut statements = Statements::of_trace(&trace.after, &trace.result);
-        let mut session = Session::clone(&trace.after.session);
-        session.effects = trace.after.parameters.effects.iter().map(Effect::alone).collect();
-        statements.measure.step = attainable(&session, statements.measure.step);
+        statements.measure.step = attainable(&trace.after, statements.measure.step);
         Stated { statements, result: &trace.result }
     }
 }

@@ -3,11 +3,11 @@
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{NextStep, Statements};
 use abbe_identify::statements::has_candidates;
+use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::analysis::{PlanOptions, prepared};
 use crate::design::Goal;
 use crate::improve::{ImproveOptions, improve};
 use crate::results::{Contribution, ErrorAnalysis, PlanAnalysis};
@@ -33,12 +33,14 @@ const MIN_LIMITING_SHARE: f64 = 0.1;
 /// Contributions that limit an error, at most.
 const MAX_LIMITING: usize = 2;
 
-/// The step after a session is identified, or [`NextStep::NoneHelps`] if it asks for a test that identifies and no
-/// candidate test does.
-pub fn attainable(session: &Session, step: NextStep) -> NextStep {
+/// The step after a session is fitted with the effects and the noise of `problem`, or [`NextStep::NoneHelps`] if it asks for
+/// a test that identifies and no candidate test does.
+pub fn attainable(problem: &Problem, step: NextStep) -> NextStep {
     attainable_of(step, || {
-        let (complete, noise) = prepared(session, &PlanOptions::default())?;
-        states::problem_by_test(&complete, noise)
+        // Priors determine the coefficients of families, so that no test identifies more of them.
+        let effects = problem.parameters.effects.iter().filter(|effect| effect.family().is_none());
+        let session = Session { effects: effects.map(Effect::alone).collect(), ..Session::clone(&problem.session) };
+        states::problem_by_test(&states::complete(&session, false)?, problem.noise.clone())
     })
 }
 
