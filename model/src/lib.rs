@@ -9,7 +9,7 @@
 //! - [`sensitivity`]: readings and their derivatives by every component; [`replay`]: evaluation over columns of
 //!   readings;
 //! - [`session`]: machine, tests and readings; [`document`]: the keys of their files;
-//! - [`words`]: counts in messages; [`calendar`]: dates and times of day in texts; [`quantity`]: units of files.
+//! - [`median`]: the median; [`words`]: counts in messages; [`calendar`]: dates and times of day in texts; [`quantity`]: units of files.
 //!
 //! The chain over plain and dual numbers: the reading of a ball bar, and its derivative by a location error of C,
 //! ∂L/∂EX0C = −R·sin C/L₀.
@@ -63,6 +63,7 @@ pub mod error;
 pub mod expression;
 pub mod frames;
 pub mod instrument;
+pub mod median;
 pub mod pattern;
 pub mod pose;
 pub mod quantity;

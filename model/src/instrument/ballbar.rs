@@ -8,12 +8,13 @@ use serde::{Deserialize, Serialize};
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
-use super::check::{MAX_MM, doubt_on_scatter, median};
+use super::check::{MAX_MM, doubt_on_scatter};
 use super::set_up::{self, SetUp};
 use super::{Contact, 
     Checked, Entry, Fault, Following, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, InternalUnit, Reading,
     SharedBy, Station, default_errors, displaced, point,
 };
+use crate::median::median;
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};

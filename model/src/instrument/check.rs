@@ -2,6 +2,7 @@
 
 use super::channel::Channel;
 use super::kind::{Checked, Fault};
+use crate::median::median;
 use crate::quantity::ARCSECOND;
 
 /// The sensor range is one to two millimetres for a ball bar and a few for an R-test. A larger deviation is not an
@@ -56,12 +57,4 @@ pub(super) fn doubt_on_scatter(deviations: &mut [f64]) -> Option<String> {
             scatter * 1e6
         )
     })
-}
-
-pub(super) fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
-use super::check::{self, MAX_MM, median};
+use super::check::{self, MAX_MM};
 use super::kind::Checked;
 use super::operation::direction_in_words;
 use super::set_up::{self, SetUp, Written};
@@ -26,6 +26,7 @@ use super::{Aligned, Travel,
     Entry, Fault, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
     displaced, point,
 };
+use crate::median::median;
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;

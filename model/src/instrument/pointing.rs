@@ -11,13 +11,13 @@ use serde::{Deserialize, Serialize};
 use super::bearing::{Sight, bearings, direction, observed_bearings};
 use super::channel::Channel;
 use super::column::{Column, Quantity};
-use super::check::median;
 use super::kind::Checked;
 use super::set_up::{self, SetUp, Written};
 use super::{Aligned, Travel, 
     Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
     default_errors, point,
 };
+use crate::median::median;
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
@@ -179,10 +179,13 @@ impl Instrument for Pointing<f64> {
         let readings = checked.readings;
         let mut state = Vec::new();
         let mut away = Vec::with_capacity(readings.rows());
+        let mut in_tool = Vec::with_capacity(readings.rows());
         for (row, values) in readings.observed.chunks_exact(CHANNELS.len()).enumerate() {
             readings.state(checked.machine, row, &mut state);
-            let ahead = self.nominal::<f64>(checked.machine, &state)[0];
-            away.push(dot(observed(values[0], values[1]), ahead).clamp(-1.0, 1.0).acos().to_degrees());
+            let (seen, nominal) = (observed(values[0], values[1]), self.nominal::<f64>(checked.machine, &state));
+            away.push(angle_deg(seen, nominal[0]));
+            let parts = nominal.iter().zip(&self.directions).map(|(now, tool)| Point(tool.map(|x| x * dot(seen, *now))));
+            in_tool.push(parts.fold(Point([0.0; 3]), |sum, part| sum.plus(part)));
         }
         let typical = median(&mut away);
         if typical <= MAX_AWAY_DEG {
@@ -195,11 +198,32 @@ impl Instrument for Pointing<f64> {
                 checked.test,
                 readings.rows()
             ),
-            "check the directions of the axes (a mount that turns through east as R is defined has `direction = [0, 0, \
-             -1]` for azimuth and `[0, -1, 0]` for elevation), `line_of_sight`, and the units of the columns"
-                .into(),
+            line_of_sight(&in_tool).unwrap_or_else(|| {
+                "check the directions of the axes (a mount that turns through east as R is defined has `direction = [0, 0, \
+                 -1]` for azimuth and `[0, -1, 0]` for elevation), `line_of_sight`, and the units of the columns"
+                    .into()
+            }),
         ))
     }
+}
+
+/// What to do if one line of sight fits all that was observed, given in the tool frame.
+fn line_of_sight(in_tool: &[Point<f64>]) -> Option<String> {
+    let sum = in_tool.iter().fold(Point([0.0; 3]), |sum, seen| sum.plus(*seen));
+    let mean = Point(sum.0.map(|x| x / sum.norm()));
+    let [x, y, z] = mean.0;
+    let scatter = median(&mut in_tool.iter().map(|seen| angle_deg(*seen, mean)).collect::<Vec<_>>());
+    (scatter <= MAX_SCATTER_DEG).then(|| {
+        format!(
+            "all readings but for {scatter:.2}° (median) agree with one line of sight in the tool frame: state `line_of_sight = \
+             [{x:.4}, {y:.4}, {z:.4}]` if the axes are as drawn"
+        )
+    })
+}
+
+/// The angle between two directions of unit length, deg.
+fn angle_deg(a: Point<f64>, b: Point<f64>) -> f64 {
+    dot(a, b).clamp(-1.0, 1.0).acos().to_degrees()
 }
 
 /// The direction of an azimuth and an elevation in R.
@@ -210,3 +234,5 @@ fn observed(azimuth: f64, elevation: f64) -> Point<f64> {
 
 /// Largest typical angle between the nominal line of sight and what was observed, deg: index errors are smaller.
 const MAX_AWAY_DEG: f64 = 20.0;
+/// Largest scatter of what was observed about one line of sight, deg, at which it is that of the mount.
+const MAX_SCATTER_DEG: f64 = 2.0;

@@ -19,12 +19,13 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
-use super::check::{MAX_MM, median};
+use super::check::MAX_MM;
 use super::set_up::{self, SetUp, Written};
 use super::{Contact, 
     Checked, Entry, Fault, Following, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy,
     Station, default_errors, displaced, point,
 };
+use crate::median::median;
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};

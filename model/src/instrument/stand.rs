@@ -5,10 +5,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::check::median;
 use super::set_up::Written;
 use super::{InstrumentParameter, SharedBy, point};
 use crate::frames::{Point, Rotation, SmallMotion, dot_nominal};
+use crate::median::median;
 use crate::scalar::{Nominal, Scalar};
 
 /// A point is a gross error if it is this many times the median farther from where it would be, and by so many mm.
