@@ -103,3 +103,11 @@ fn a_mount_that_turns_the_other_way_is_refused() {
     let text = error_text(read("a.dat", TPOINT, reversed));
     assert_contains(&text, &["away from what was observed", "direction = [0, 0, -1]"]);
 }
+
+/// The readings agree with the line of sight along X, whatever the session states.
+#[test]
+fn a_line_of_sight_that_fits_is_named() {
+    let elsewhere = |text: &str| text.replace("name = \"N\"", "name = \"N\"\nline_of_sight = [0.6, 0, -0.8]");
+    let text = error_text(read("a.dat", TPOINT, elsewhere));
+    assert_contains(&text, &["points 53.", "agree with one line of sight", "`line_of_sight = [1.0000, "]);
+}

@@ -7,9 +7,10 @@ use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
 use nalgebra::Vector3;
 
-use super::hypotheses::{Hypothesis, columns_exchanged, lengths, units, with_readings};
+use super::hypotheses::{Hypothesis, columns_exchanged, conventions, lengths, units, with_readings};
 use super::quick_fit::{thinned, trial};
 use super::results::{Suggestion, SuggestionKind};
+use crate::heldout::rms_mm;
 use crate::noise::{Noise, NoiseSource};
 use crate::numerics::parallel;
 use crate::problem::Problem;
@@ -22,6 +23,8 @@ const LOWERED: f64 = 3.0;
 const NOT_SEPARABLE: f64 = 1.5;
 /// Maximum number of listed mistakes.
 const MAX_LISTED: usize = 5;
+/// Machines of other tables that are fitted.
+const MAX_NEAREST: usize = 4;
 /// Noise for the comparison of residuals, mm; its value has no influence.
 const NOISE_MM: f64 = 1.0;
 
@@ -99,6 +102,14 @@ pub(super) fn suggestions(problem: &Problem) -> Vec<Suggestion> {
     tried.iter_mut().for_each(|(rms_mm, hypothesis)| *rms_mm = share(*rms_mm, &hypothesis.session));
     tried.retain(|(left, _)| *left * LOWERED < base);
     tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // Many tables have one convention.
+    let mut words = Vec::new();
+    tried.retain(|(_, hypothesis)| {
+        !words.contains(&hypothesis.words) && {
+            words.push(hypothesis.words.clone());
+            true
+        }
+    });
     let best = tried.first().map_or(0.0, |(left, _)| *left);
     (tried.into_iter())
         .take_while(|(left, _)| *left <= best * NOT_SEPARABLE)
@@ -110,6 +121,20 @@ pub(super) fn suggestions(problem: &Problem) -> Vec<Suggestion> {
             words: hypothesis.words,
         })
         .collect()
+}
+
+/// The hypotheses that leave least with the set-up that is found before the first iteration: a machine that is wrong takes many
+/// iterations.
+fn nearest(hypotheses: Vec<Hypothesis>) -> Vec<Hypothesis> {
+    let left = parallel::map(hypotheses.len(), &|k| {
+        let problem = Problem::new(&hypotheses[k].session, Noise::white(NOISE_MM, NoiseSource::Stated), 1).ok();
+        problem.map_or(f64::INFINITY, |problem| {
+            rms_mm(&problem, &problem.residuals(&vec![0.0; problem.parameters.list.len()]))
+        })
+    });
+    let mut ranked: Vec<(f64, Hypothesis)> = left.into_iter().zip(hypotheses).collect();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    ranked.into_iter().take(MAX_NEAREST).map(|(_, hypothesis)| hypothesis).collect()
 }
 
 /// The mistakes that are tried on poses.
@@ -175,5 +200,6 @@ fn of_poses(session: &Session) -> Vec<Hypothesis> {
         }
         list.extend(columns_exchanged(session, &axes));
     }
+    list.extend(nearest(conventions(session)));
     list
 }

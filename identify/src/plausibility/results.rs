@@ -91,6 +91,8 @@ pub enum SuggestionKind {
     ColumnSign,
     /// Two columns are exchanged.
     ColumnsExchanged,
+    /// The machine comes from a table of Denavit–Hartenberg parameters that was read in the other convention.
+    DhConvention,
 }
 
 /// A change of the session that removes the conflicts.

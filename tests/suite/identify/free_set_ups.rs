@@ -4,13 +4,16 @@
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
+use std::sync::Arc;
 
+use abbe::files::robot::dh::{Convention, DhRow, Table};
 use abbe::files::{self, ReadOptions};
 use abbe::identify::IdentifyError;
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::noise::NoiseSource;
 use abbe::identify::plausibility::accepted;
 use abbe::identify::results::{Finding, FitResult};
+use abbe::model::axis::AxisKind;
 use abbe::model::session::Session;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -327,6 +330,39 @@ fn a_convention_that_explains_poses_is_named() {
             assert!(!told.contains("explained if"), "{told}");
         } else {
             assert!(told.contains(words), "{words}: {told}");
+        }
+    }
+}
+
+/// A table of a UR5e in one convention, read in the other one, gives a machine of other axes. The readings are of the right
+/// machine, and the convention is named.
+#[test]
+fn the_other_convention_of_a_table_is_named() {
+    let d = [162.5, 0.0, 0.0, 133.3, 99.7, 99.6];
+    let standard = ([0.0, -425.0, -392.2, 0.0, 0.0, 0.0], [90.0, 0.0, 0.0, 90.0, -90.0, 0.0]);
+    let modified = ([0.0, 0.0, -425.0, -392.2, 0.0, 0.0], [0.0, 90.0, 0.0, 0.0, 90.0, -90.0]);
+    for kind in [Kind::Tracker, Kind::Pose] {
+        for ((a, alpha), other, words) in [
+            (standard, Convention::Modified, "read as modified, which is standard"),
+            (modified, Convention::Standard, "read as standard, which is modified"),
+        ] {
+            let row = |k: usize| {
+                let (a, alpha, d, kind) = (a[k], f64::to_radians(alpha[k]), d[k], Some(AxisKind::Rotary));
+                DhRow { name: format!("J{}", k + 1), a, alpha, d, kind, ..DhRow::default() }
+            };
+            let table = Table { convention: other, rows: (0..6).map(row).collect(), assumed: Vec::new() };
+            let folder = tempfile::tempdir().unwrap();
+            let mut session = Simulated::new(UR5E, 7).write(folder.path(), kind, 0.0, as_it_is);
+            let machine = Arc::make_mut(&mut session.machine);
+            for (axis, joint) in machine.axes.iter_mut().zip(table.chain("m").joints) {
+                axis.direction = (joint.pose.rotation * Vector3::z()).into();
+                axis.origin_mm = joint.pose.translation.vector.into();
+            }
+            let told = match fitted(&session) {
+                Ok(found) => accepted(&found.plausibility).unwrap_err().to_string(),
+                Err(error) => error.to_string(),
+            };
+            assert!(told.contains(words), "{kind:?}, {words}: {told}");
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The mistakes that are tried: each is the session with one statement changed.
 
+mod dh;
 mod set_ups;
 
 use std::sync::Arc;
@@ -23,6 +24,8 @@ impl Hypothesis {
         Hypothesis { kind, subject, words, session }
     }
 }
+
+pub(super) use dh::conventions;
 
 /// Coordinates of balls below this are zero, mm.
 const ZERO_MM: f64 = 1e-6;
