@@ -32,13 +32,14 @@ pub fn section(report: &mut Report, trace: &TraceOutcome) {
     for (number, effect) in result.effects.iter().enumerate() {
         let heading = format!("{}. {} ({})", number + 1, name(&effect.name), effect.name.meaning);
         report.key(if number < MAX_OPEN { Text::Heading(heading) } else { Text::Fold(heading) });
-        report.key(values(effect, result.candidates_detectable, result.effects.len() == 1));
+        report.key(values(effect, &uniqueness::screened(result), result.effects.len() == 1));
         alternatives(report, effect, result.candidates_detectable);
         let id = trace.effects.get(number).map(|effect| effect.id()).unwrap_or_default();
         let competing = trace.competing_effects.get(number).filter(|_| number < MAX_RANKED);
         report.figures((!effect.curve.is_empty()).then(|| curve(effect)));
         report.figures(competing.map(|competing| ranking(competing, &id)));
     }
+    report.folded("Families of effects that were searched", Text::List(result.families.clone()));
     let rejected = Text::List(present::rejected(result));
     report.headed(Level::Key, "Rejected, because the held-out error does not decrease significantly:", rejected);
     if let Some(remainder) = present::remainder(result) {
@@ -51,7 +52,7 @@ pub fn section(report: &mut Report, trace: &TraceOutcome) {
 }
 
 /// What the effect is, explains, and competes with.
-fn values(effect: &EffectResult, screened: usize, is_alone: bool) -> Table {
+fn values(effect: &EffectResult, screened: &str, is_alone: bool) -> Table {
     let mut rows = vec![cells!["estimate", estimate(effect)]];
     rows.extend(effect.prior.iter().map(|prior| cells!["prior", present::prior(prior)]));
     let explains =
@@ -65,7 +66,8 @@ fn values(effect: &EffectResult, screened: usize, is_alone: bool) -> Table {
         ]);
     }
     rows.push(cells!["family", &effect.family]);
-    rows.push(cells!["uniqueness", uniqueness::standing(effect, screened)]);
+    let standing = uniqueness::standing(effect, screened);
+    rows.push(cells!["uniqueness", format!("{standing}{}", uniqueness::also(&effect.variants))]);
     Table::new(["", ""], rows)
 }
 
@@ -109,8 +111,9 @@ fn alternatives(report: &mut Report, effect: &EffectResult, screened: usize) {
     let line = |(place, alias): (usize, &AliasResult)| {
         let predicted = uniqueness::worse_prediction(effect, place);
         format!(
-            "or {}  ({}); {}{}",
+            "or {}{}  ({}); {}{}",
             alias.name.meaning,
+            uniqueness::also(&alias.variants),
             name(&alias.name),
             uniqueness::likelihood(alias),
             predicted.map_or(String::new(), |words| format!("; {words}"))
@@ -135,18 +138,29 @@ fn alternatives(report: &mut Report, effect: &EffectResult, screened: usize) {
 /// The effect and its aliases: likelihood, prediction of left-out tests, and what each proposed test achieves.
 fn explanations(effect: &EffectResult) -> Table {
     let predicts = effect.left_out_test_rms_um.is_some();
-    let row = |name_of: &EffectName, likelihood: String, predicted: Option<f64>, outcomes: Vec<String>| {
-        let mut row = cells![format!("{} ({})", name_of.meaning, name(name_of)), likelihood];
+    let row = |name_of: &EffectName,
+               variants: &[EffectName],
+               likelihood: String,
+               predicted: Option<f64>,
+               outcomes: Vec<String>| {
+        let mut row =
+            cells![format!("{}{} ({})", name_of.meaning, uniqueness::also(variants), name(name_of)), likelihood];
         row.extend(predicts.then(|| Cell::or_dash(predicted.map(|um| of_readings(um, effect.reading_unit).into()))));
         row.extend(outcomes.into_iter().map(Cell::from));
         row
     };
     let tests = &effect.separating_tests;
-    let own = row(&effect.name, "selected".into(), effect.left_out_test_rms_um, vec!["selected".into(); tests.len()]);
+    let own = row(
+        &effect.name,
+        &effect.variants,
+        "selected".into(),
+        effect.left_out_test_rms_um,
+        vec!["selected".into(); tests.len()],
+    );
     let aliases = effect.aliases.iter().enumerate().map(|(place, alias)| {
         let predicted = effect.aliases_left_out_test_rms_um.get(place).copied().flatten();
         let outcomes = tests.iter().map(|test| separation(&alias.name, test)).collect();
-        row(&alias.name, uniqueness::likelihood(alias), predicted, outcomes)
+        row(&alias.name, &alias.variants, uniqueness::likelihood(alias), predicted, outcomes)
     });
     let mut columns = ["explanation", "in place of the selected effect"].map(Column::from).to_vec();
     columns.extend(predicts.then(|| Column::from("left-out test")));

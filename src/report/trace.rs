@@ -201,8 +201,7 @@ fn key_figures(trace: &TraceOutcome, before: &Quality<'_>, after: &Quality<'_>) 
     match result.effects.as_slice() {
         [] => {}
         [one] if one.unique => {
-            let among = format!("among {} detectable candidates", integer(result.candidates_detectable));
-            figures.push(KeyFigure::new("Uniqueness", "unique", among));
+            figures.push(KeyFigure::new("Uniqueness", "unique", format!("among {}", uniqueness::screened(result))));
         }
         [one] => {
             let count = format!("1 of {}", one.explanation_count);

@@ -2,7 +2,7 @@
 //! report.
 
 use abbe::identify::results::{AliasResult, EffectName, EffectResult, SeparatingTestResult, TraceResult};
-use abbe::model::words::with_exponent;
+use abbe::model::words::{counted, listed, with_exponent};
 
 use super::number::of_readings;
 
@@ -14,9 +14,18 @@ const MAX_LISTED: usize = 4;
 /// What is said of an effect of a family.
 const NOT_COMPARED: &str = "competing explanations are not compared";
 
+/// What was compared: `27 families with 4098 candidates screened`.
+pub fn screened(result: &TraceResult) -> String {
+    let candidates = format!("{} candidates screened", result.candidates_detectable);
+    match result.families.len() {
+        0 => candidates,
+        several => format!("{} with {candidates}", counted(several, "family")),
+    }
+}
+
 /// The uniqueness of all effects in one line; `None` without an effect.
 pub fn headline(result: &TraceResult) -> Option<String> {
-    let screened = result.candidates_detectable;
+    let screened = &screened(result);
     match result.effects.as_slice() {
         [] => None,
         all if all.iter().any(|effect| effect.prior.is_some()) => {
@@ -25,7 +34,7 @@ pub fn headline(result: &TraceResult) -> Option<String> {
         }
         [one] => Some(format!("{}: {}", standing(one, screened), in_short(one))),
         all if all.iter().all(|effect| effect.unique) => {
-            Some(format!("{} effects, each unique among {screened} candidates screened", all.len()))
+            Some(format!("{} effects, each unique among {screened}", all.len()))
         }
         few if few.len() <= MAX_LISTED => {
             let each = few.iter().enumerate();
@@ -39,7 +48,7 @@ pub fn headline(result: &TraceResult) -> Option<String> {
             let unique = many.len() - alike.len();
             let most = alike.iter().copied().max().unwrap_or(1);
             Some(format!(
-                "{} effects: {unique} unique among {screened} candidates screened, {} with up to {most} indistinguishable explanations",
+                "{} effects: {unique} unique among {screened}, {} with up to {most} indistinguishable explanations",
                 many.len(),
                 alike.len()
             ))
@@ -47,12 +56,12 @@ pub fn headline(result: &TraceResult) -> Option<String> {
     }
 }
 
-/// `1 of 9 indistinguishable explanations`, or `unique among 4098 candidates screened`.
-pub fn standing(effect: &EffectResult, screened: usize) -> String {
+/// `1 of 9 indistinguishable explanations`, or `unique among 27 families with 4098 candidates screened`.
+pub fn standing(effect: &EffectResult, screened: &str) -> String {
     if effect.prior.is_some() {
         format!("member of a family: {NOT_COMPARED}")
     } else if effect.unique {
-        format!("unique among {screened} candidates screened")
+        format!("unique among {screened}")
     } else {
         format!("1 of {} indistinguishable explanations", effect.explanation_count)
     }
@@ -69,6 +78,17 @@ pub fn worse_prediction(effect: &EffectResult, alias: usize) -> Option<String> {
     let [alias, own] = [of_alias, of_effect].map(|rms| of_readings(rms, effect.reading_unit));
     let words = || format!("left-out test {alias}, with the effect {own}");
     (of_alias > WORSE * of_effect).then(words)
+}
+
+/// The variants of an explanation, in words: ` (also: tilt about Y, repeating every 356.7°)`.
+pub fn also(variants: &[EffectName]) -> String {
+    let what = |variant: &EffectName| {
+        variant.meaning.split_once(": ").map_or(variant.meaning.as_str(), |(_, what)| what).to_string()
+    };
+    match variants {
+        [] => String::new(),
+        _ => format!(" (also: {})", listed(&variants.iter().map(what).collect::<Vec<_>>(), "or")),
+    }
 }
 
 /// How equal an alias is: `Δχ² 1.3, likelihood ratio 0.52`.

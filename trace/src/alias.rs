@@ -13,7 +13,7 @@ use std::collections::HashSet;
 use abbe_identify::error::IdentifyError;
 use abbe_model::effect::Shape;
 
-use super::constants::{INDISTINGUISHABLE, MAX_COMPETING, MIN_COSINE};
+use super::constants::{INDISTINGUISHABLE, MAX_COMPETING, MIN_COSINE, SAME_READINGS};
 use super::plausible::prior_cost;
 use super::state::{ALL, SearchState};
 use crate::candidates::gain::{Gain, TrainedModel};
@@ -30,6 +30,9 @@ pub(super) struct Alias {
     pub delta_chi2: f64,
     /// Its prior cost less that of the found effect ([`super::plausible`]).
     pub prior_cost: f64,
+    /// The candidate of which it is a variant: another shape of the same component over the same driver, whose fitted
+    /// readings are the same. `None` for an explanation of its own.
+    pub variant_of: Option<usize>,
 }
 
 impl Alias {
@@ -165,7 +168,7 @@ pub(super) fn aliases(
         if cosine >= MIN_COSINE {
             let delta_chi2 = (of_named.gain - gain) / variance;
             let prior_cost = cost(candidate) - cost(selected.candidate);
-            aliases.push(Alias { candidate, cosine, delta_chi2, prior_cost });
+            aliases.push(Alias { candidate, cosine, delta_chi2, prior_cost, variant_of: None });
         }
     }
     aliases.sort_by(|a, b| {
@@ -179,6 +182,40 @@ pub(super) fn aliases(
     let named = search.effect(selected.candidate).id();
     let mut ids = HashSet::from([named]);
     aliases.retain(|alias| ids.insert(search.effect(alias.candidate).id()));
+    mark_variants(search, selected.candidate, model, variance, &mut aliases)?;
     let competing_effects = competing_effects(search, k, &gains, variance, &aliases);
     Ok((aliases, competing_effects))
+}
+
+/// Marks the aliases that are variants of the found effect, or of an alias before them. Of one explanation the simplest
+/// shape has the name.
+fn mark_variants(
+    search: &SearchState<'_>,
+    found: usize,
+    model: &TrainedModel<'_>,
+    variance: f64,
+    aliases: &mut [Alias],
+) -> Result<(), IdentifyError> {
+    let same = SAME_READINGS.powi(2) * variance * search.columns.rows() as f64;
+    let is_variant = |one: usize, other: usize| -> Result<bool, IdentifyError> {
+        let [a, b] = [one, other].map(|candidate| search.effect(candidate));
+        let alike = a.component == b.component && a.driver == b.driver && a.tests == b.tests;
+        Ok(alike && model.difference_square([one, other])? < same)
+    };
+    let mut order: Vec<usize> = (0..aliases.len()).collect();
+    order.sort_by_key(|place| search.gram.numbers(aliases[*place].candidate));
+    let mut heads = vec![found];
+    for place in order {
+        let own = aliases[place].candidate;
+        for head in &heads {
+            if is_variant(own, *head)? {
+                aliases[place].variant_of = Some(*head);
+                break;
+            }
+        }
+        if aliases[place].variant_of.is_none() {
+            heads.push(own);
+        }
+    }
+    Ok(())
 }

@@ -67,6 +67,9 @@ pub const INTERVALS: [usize; 3] = [8, 16, 32];
 /// least half of the squared signature. The evidence alone does not suffice: a candidate may explain as much of a
 /// different structure.
 pub const MIN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// Rms difference of the fitted readings, in standard deviations of the noise, below which two shapes of one component over
+/// one driver are one explanation.
+pub const SAME_READINGS: f64 = 0.1;
 /// Maximum number of competing explanations of a found effect.
 pub const MAX_COMPETING: usize = 16;
 

@@ -64,6 +64,12 @@ impl RefittedModel {
         self.effects.iter().eq(selected_effects(search))
     }
 
+    /// The found effects with their estimated shape numbers.
+    pub fn estimated(&self, search: &SearchState<'_>) -> &[Effect] {
+        let all = &self.after.parameters.effects;
+        &all[all.len().saturating_sub(search.selected().len())..]
+    }
+
     /// Whether the residual may have significant structure. An untested residual may.
     pub fn is_structured(&self) -> bool {
         self.structure.as_ref().is_none_or(Structure::is_significant)

@@ -73,6 +73,16 @@ pub(super) fn search_and_refit(
             judged = judge(search)?;
         }
     }
+    // An effect whose number has no value in these readings is no effect of its own.
+    loop {
+        let beyond = search.beyond_library(judged.estimated(search));
+        if beyond.is_empty() {
+            break;
+        }
+        search.exclude(&beyond)?;
+        ended = search_on(search, record)?;
+        judged = judge(search)?;
+    }
     if search.policy.withdraws {
         moves::on_every_branch(&Withdraw { structured: judged.is_structured() }, search)?;
         search.note_held_out()?;

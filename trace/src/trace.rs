@@ -356,8 +356,8 @@ fn trace_or_interrupted(
         // The effects found so far are fitted. Their residual is not tested for structure.
         None => (None, RefittedModel::of(problem, before_fit, &search, options, None)?),
     };
-    let RefittedModel { after, after_fit, structure: structure_after, .. } = judged;
     search.tune_aliases()?;
+    let RefittedModel { after, after_fit, structure: structure_after, .. } = judged;
     let [structure_before, structure_after] = match policy.tests_structure || interrupted {
         true => [structure_before.cloned(), structure_after],
         false => [structure_of_poses(problem, before_fit, options)?, structure_of_poses(&after, &after_fit, options)?],

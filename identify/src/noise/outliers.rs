@@ -3,7 +3,8 @@
 //!
 //! Structure in the residual must not be excluded. Along a run a residual is therefore compared with the medians of its
 //! neighbours on either side, not with zero (Hampel's identifier: Davies & Gather, J. Am. Stat. Assoc. 88 (1993) 782).
-//! A deviation that returns in the repeats of the reading is structure too: a spike after every reversal.
+//! A deviation that returns in the repeats of the reading is structure too: a spike after every reversal. It is none at the
+//! first reading of a run that begins at a reversal: the axis came from either side, so that its lost motion there is unknown.
 //! A run of few readings has too few neighbours for a median. There a reading is compared with its repeats, less what all
 //! readings of the run differ from theirs.
 //! In the residual of a circle's own diagnosis, which contains all structure, it is compared with zero and with both
@@ -248,10 +249,31 @@ fn retain_unrepeated(rows: &mut Vec<(usize, f64)>, readings: &Readings, deviatio
     let ordered: HashMap<&[i64], Ordered> = (repeats.into_iter())
         .map(|(key, rows)| (key, Ordered::of(rows.into_iter().map(|row| deviations[row]))))
         .collect();
+    let begins: Vec<usize> =
+        readings.runs().iter().filter(|run| begins_at_reversal(readings, run)).map(|run| run.start).collect();
     rows.retain(|(row, limit)| {
+        if begins.contains(row) {
+            return true;
+        }
         let others = ordered.get(keys.of_row(*row)).and_then(|ordered| ordered.median_without(deviations[*row]));
         others.is_none_or(|median| (deviations[*row] - median).abs() > *limit)
     });
+}
+
+/// Share of the second step of an axis below which its first step is one from rest. From the end of a circle's diameter it
+/// is a third; at constant speed both are equal.
+const FROM_REST: f64 = 0.5;
+
+/// Whether a run begins where an axis reverses.
+fn begins_at_reversal(readings: &Readings, run: &Range<usize>) -> bool {
+    let from_rest = |positions: &Vec<f64>| match positions[run.clone()] {
+        [first, second, third, ..] => {
+            let [step, next] = [second - first, third - second];
+            step * next > 0.0 && step.abs() < FROM_REST * next.abs()
+        }
+        _ => false,
+    };
+    readings.positions.iter().any(from_rest)
 }
 
 /// The median of five values: that of the fifth and the two middle values of the first four.
@@ -285,6 +307,38 @@ mod tests {
         let rejected = reject_along_runs(&readings, &residual, 1, 3e-4);
         let rows: Vec<usize> = (0..rejected.len()).filter(|row| rejected[*row]).collect();
         assert_eq!(rows, [PLACES + 17]);
+    }
+
+    /// A circle that begins where X reverses, twice: the first reading has the lost motion of the way before. It returns, and
+    /// is none of the way after. On a sweep at constant speed it is structure.
+    #[test]
+    fn the_first_reading_at_a_reversal_may_have_the_lost_motion_of_the_way_before() {
+        const PLACES: usize = 60;
+        let turn = |row: usize| std::f64::consts::TAU * (row % PLACES) as f64 / PLACES as f64;
+        let of = |positions: Vec<f64>| {
+            let readings = Readings {
+                positions: vec![positions],
+                run: (0..2 * PLACES).map(|row| (row / PLACES) as i64).collect(),
+                channels: 1,
+                ..Readings::default()
+            };
+            let backlash = |row: usize| match row % PLACES {
+                0 => -2e-3,
+                place => {
+                    if turn(place) < std::f64::consts::PI {
+                        2e-3
+                    } else {
+                        -2e-3
+                    }
+                }
+            };
+            let noise = |row: usize| 1e-4 * (((row * 7) % 11) as f64 - 5.0);
+            let residual: Vec<f64> = (0..2 * PLACES).map(|row| backlash(row) + noise(row)).collect();
+            let rejected = reject_along_runs(&readings, &residual, 1, 3e-4);
+            (0..rejected.len()).filter(|row| rejected[*row]).collect::<Vec<_>>()
+        };
+        assert_eq!(of((0..2 * PLACES).map(|row| 100.0 * turn(row).cos()).collect()), [0, PLACES]);
+        assert_eq!(of((0..2 * PLACES).map(turn).collect()), [0; 0]);
     }
 
     /// A slope that the model lacks stays whole. A spike at its first reading does not.

@@ -167,6 +167,9 @@ pub struct AliasResult {
     pub prior_cost: f64,
     /// Probability of the alias over that of the found effect: `likelihood_ratio` · exp(−`prior_cost`).
     pub probability_ratio: f64,
+    /// Other shapes of the same component over the same driver, with the same fitted readings.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub variants: Vec<EffectName>,
 }
 
 /// An effect that the search has found.
@@ -205,7 +208,11 @@ pub struct EffectResult {
     pub heldout_rms_um: f64,
     /// Whether the effect is unique: no other effect of the library explains the readings equally well in its place.
     pub unique: bool,
-    /// Number of explanations that the readings do not separate, this effect included; 1 where it is unique.
+    /// Other shapes of the same component over the same driver, with the same fitted readings: variants of this explanation.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub variants: Vec<EffectName>,
+    /// Number of explanations that the readings do not separate, this effect included; 1 where it is unique. Variants count
+    /// once.
     pub explanation_count: usize,
     /// All of these explanations in words, by part of the machine:
     /// `C table: axial motion twice per turn, or tilt about X once per turn`.
@@ -367,6 +374,9 @@ pub struct TraceResult {
     pub candidates: usize,
     /// Number of candidates that these readings can detect.
     pub candidates_detectable: usize,
+    /// The families of effects of these candidates: what is unique is unique among them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub families: Vec<String>,
     /// The null-space directions of the model with the found effects, in words.
     pub unobservable: Vec<Unobservable>,
     /// The null space of the model with the found effects, as a matrix.

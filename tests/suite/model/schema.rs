@@ -284,6 +284,7 @@ fn results_hold_and_have_the_fields_of_the_design() {
                 "changed_parameters",
                 "candidates",
                 "candidates_detectable",
+                "families",
                 "unobservable",
                 "null_space",
                 "outliers",

@@ -29,6 +29,8 @@ pub(crate) struct Candidate {
     pub tuned_on: Vec<usize>,
     /// Whether the readings would show it at its largest plausible size.
     pub detectable: bool,
+    /// Whether the search has excluded it.
+    pub forbidden: bool,
 }
 
 impl Candidate {
@@ -46,6 +48,7 @@ impl Candidate {
             grid,
             tuned_on: Vec::new(),
             detectable: true,
+            forbidden: false,
         }
     }
 

@@ -264,6 +264,31 @@ impl<'m> TrainedModel<'m> {
         coefficients: &[f64],
     ) -> Result<f64, IdentifyError> {
         let Projected { d, own, .. } = self.projected(candidate)?;
+        let (g, projected) = self.with_signature(candidate, effect, coefficients)?;
+        let subspace = ObservableSubspace::of(&d, &own);
+        Ok(if projected <= 0.0 { 0.0 } else { (subspace.quadratic(&g) / projected).clamp(0.0, 1.0) })
+    }
+
+    /// The square of the difference of the fitted readings with one candidate and with another in its place, each with its
+    /// own coefficients beside the model, in variances of the noise.
+    ///
+    /// # Errors
+    /// If products are not finite.
+    pub fn difference_square(&self, [one, other]: [usize; 2]) -> Result<f64, IdentifyError> {
+        let [of_one, of_other] = [self.with_candidate(one)?.1, self.with_candidate(other)?.1];
+        let (with_one, square) = self.with_signature(one, other, &of_other)?;
+        let product: f64 = of_one.iter().zip(&with_one).map(|(c, g)| c * g).sum();
+        Ok((self.gain(one)?.gain + square - 2.0 * product).max(0.0))
+    }
+
+    /// The products of a candidate's columns with the signature of an effect, and of the signature with itself, beside the
+    /// model.
+    fn with_signature(
+        &self,
+        candidate: usize,
+        effect: usize,
+        coefficients: &[f64],
+    ) -> Result<(Vec<f64>, f64), IdentifyError> {
         let signature = self.projection.chosen(self.gram, effect)?;
         // The signature's products with the chosen effects and with the candidate, the fitted model projected out.
         let along = |products: &Mat<f64>, column: usize| -> f64 {
@@ -287,9 +312,7 @@ impl<'m> TrainedModel<'m> {
         let length: f64 = coefficients.iter().enumerate().map(|(l, c)| c * along(&itself, l)).sum();
         let m = with_chosen.len();
         let solved = |i: usize| (0..m).map(|j| self.inverse[(i, j)] * with_chosen[j]).sum::<f64>();
-        let projected = length - beside(&solved);
-        let subspace = ObservableSubspace::of(&d, &own);
-        Ok(if projected <= 0.0 { 0.0 } else { (subspace.quadratic(&g) / projected).clamp(0.0, 1.0) })
+        Ok((g, length - beside(&solved)))
     }
 
     /// Coefficients of the model columns and of the chosen effects, and of a candidate's columns, if the candidate is

@@ -39,6 +39,8 @@ pub(super) struct Statements {
     pub rejected: Vec<RejectedCandidate>,
     /// Number of candidates, and of those that the readings would show.
     pub candidates: [usize; 2],
+    /// The families of these.
+    pub families: Vec<String>,
     pub interrupted: bool,
     /// Warnings of the search.
     pub warnings: Vec<String>,
@@ -89,6 +91,7 @@ pub(super) fn build(
         rejected_candidates: rejected,
         candidates: candidates[0],
         candidates_detectable: candidates[1],
+        families: statements.families,
         unobservable: fit::unobservable(problem, &fit.rank),
         null_space: fit::null_space(problem, &fit.rank),
         outliers: fit::outliers(problem, fit),
@@ -115,6 +118,7 @@ pub(crate) fn unsearched(problem: &Problem, fit: &Fit) -> Result<TraceResult, Id
         remainder,
         rejected: Vec::new(),
         candidates: [0, 0],
+        families: Vec::new(),
         interrupted: false,
         warnings: Vec::new(),
     };

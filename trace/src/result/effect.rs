@@ -51,6 +51,8 @@ pub(super) struct Found<'f> {
     pub alias_effects: &'f [Effect],
     /// Increase of χ² and of the prior cost by each of these in its place.
     pub costs: &'f [[f64; 2]],
+    /// The variants of the effect, then those of each of its aliases.
+    pub variants: &'f [Vec<Effect>],
     /// The left-out tests that the effect and its aliases predict.
     pub predicted: &'f Predictions,
 }
@@ -68,6 +70,11 @@ pub(super) fn result(
     let number = found.number + findings.before.parameters.effects.len();
     let described = described(after, found.after_fit, number, found.parameters)?;
     let aliases: Vec<&Effect> = found.alias_effects.iter().collect();
+    let mut explained = explained_by(described, after, &candidate.effect, &aliases, found.costs);
+    let machine = &after.session.machine;
+    let mut variants = found.variants.iter().map(|own| own.iter().map(|own| effect_name(machine, own)).collect());
+    explained.variants = variants.next().unwrap_or_default();
+    explained.aliases.iter_mut().zip(variants).for_each(|(alias, variants)| alias.variants = variants);
     Ok(EffectResult {
         family: families.get(candidate.family).map(|family| family.name.clone()).unwrap_or_default(),
         p_value: taken.p_value,
@@ -78,7 +85,7 @@ pub(super) fn result(
             Some(_) => found.predicted.aliases_um.clone(),
             None => Vec::new(),
         },
-        ..explained_by(described, after, &candidate.effect, &aliases, found.costs)
+        ..explained
     })
 }
 
@@ -102,6 +109,7 @@ pub(super) fn explained_by(
         likelihood_ratio: ratio(-0.5 * delta_chi2),
         prior_cost: *prior_cost,
         probability_ratio: ratio(-0.5 * delta_chi2 - prior_cost),
+        variants: Vec::new(),
     };
     EffectResult {
         unique: aliases.is_empty(),
@@ -141,6 +149,7 @@ pub(super) fn described(
         rms_gain_um: 0.0,
         heldout_rms_um: 0.0,
         unique: true,
+        variants: Vec::new(),
         explanation_count: 1,
         explanations: explanations(&[meaning]),
         aliases: Vec::new(),

@@ -70,7 +70,8 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
     let mut chosen_candidates = Vec::new();
     let mut predicted = Vec::new();
     let mut costs = Vec::new();
-    let variance = residual_variance(findings);
+    let (mut covered, mut variants) = (Vec::new(), Vec::new());
+    let variance = residual_variance(search, before, findings.after_fit);
     for (k, taken) in search.selected().iter().enumerate() {
         let model = search.model_without(Some(k))?;
         let (mut aliases, of_effect) = alias::aliases(search, k, &model, variance)?;
@@ -81,14 +82,25 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
             // The left-out tests were predicted with the other effect in the model.
             of_tests = prediction::Predictions::none(&aliases);
         }
-        predicted.push(of_tests);
-        chosen_candidates.push((chosen.unwrap_or(taken.candidate), chosen.is_some()));
+        let found = chosen.unwrap_or(taken.candidate);
+        chosen_candidates.push((found, chosen.is_some()));
         let effect_of = |alias: &Alias| search.effect(alias.candidate).clone();
-        alias_effects.push(aliases.iter().map(effect_of).collect());
-        costs.push(aliases.iter().map(|alias| [alias.delta_chi2, alias.prior_cost]).collect::<Vec<_>>());
+        // Uncertainties cover variants too.
+        covered.push(aliases.iter().map(effect_of).collect::<Vec<Effect>>());
+        let own = |alias: &Alias| alias.variant_of.is_none();
+        of_tests.keep(|place| own(&aliases[place]));
+        predicted.push(of_tests);
+        let heads: Vec<&Alias> = aliases.iter().filter(|alias| own(alias)).collect();
+        alias_effects.push(heads.iter().map(|alias| effect_of(alias)).collect());
+        costs.push(heads.iter().map(|alias| [alias.delta_chi2, alias.prior_cost]).collect::<Vec<_>>());
+        let variants_of = |head: usize| -> Vec<Effect> {
+            aliases.iter().filter(|alias| alias.variant_of == Some(head)).map(effect_of).collect()
+        };
+        let each = std::iter::once(found).chain(heads.iter().map(|alias| alias.candidate));
+        variants.push(each.map(variants_of).collect::<Vec<_>>());
         gains.push(model.gain(taken.candidate)?.gain);
     }
-    let (after, after_fit) = with_aliases(findings, &chosen_candidates, &alias_effects)?;
+    let (after, after_fit) = with_aliases(findings, &chosen_candidates, &covered)?;
     let (after, after_fit) = (&after, &after_fit);
     let after_result = model_result(after, after_fit, held_out.last_um() * 1e-3)?;
     let (verdict, remainder) = verdict(findings, !search.selected().is_empty());
@@ -104,6 +116,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
                 rms_gain_um: (gains[k] / held_out.rows).sqrt() * before.noise.sigma_mm * 1e3,
                 alias_effects: &alias_effects[k],
                 costs: &costs[k],
+                variants: &variants[k],
                 predicted: &predicted[k],
             };
             effect::result(findings, &families, &held_out, &reported)
@@ -118,6 +131,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
         residual_before: residual_before(before, findings.structure_before, !search.selected().is_empty()),
         rejected: rejected::candidates(&before.session.machine, search, &held_out),
         candidates: [findings.candidates, findings.candidates_seen],
+        families: searched_families(search, &families),
         interrupted: findings.interrupted,
         warnings,
     };
@@ -126,6 +140,12 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
     let result = build(declared, found, statements, effects)?;
     let (after, after_fit) = (after.clone(), after_fit.clone());
     Ok(ReportedEffect { after, after_fit, result, alias_effects, competing_effects })
+}
+
+/// The families of the detectable candidates of a search.
+fn searched_families(search: &SearchState<'_>, families: &[library::Family]) -> Vec<String> {
+    let has_members = |number: usize| search.candidates.iter().any(|own| own.family == number && own.detectable);
+    families.iter().enumerate().filter(|(number, _)| has_members(*number)).map(|(_, own)| own.name.clone()).collect()
 }
 
 /// The structure of the residual of the declared model, in words.
@@ -173,12 +193,12 @@ impl<'s> HeldOut<'s> {
 
 /// Variance for the comparison of aliases, relative to that of the noise. For poses it is that of the remaining
 /// residual.
-fn residual_variance(findings: &TraceFindings<'_>) -> f64 {
-    if !findings.search.policy.in_residual_variance {
+pub(super) fn residual_variance(search: &SearchState<'_>, before: &Problem, after_fit: &Fit) -> f64 {
+    if !search.policy.in_residual_variance {
         return 1.0;
     }
     // The evidence uses the noise of the search.
-    relative_variance(&findings.after_fit.residuals, findings.before.noise.sigma_mm, findings.search.columns.rows())
+    relative_variance(&after_fit.residuals, before.noise.sigma_mm, search.columns.rows())
 }
 
 /// Variance of residuals, by test, mm, over that of the noise; at least 1. `rows` is the number of residuals that count.

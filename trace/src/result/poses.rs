@@ -67,6 +67,7 @@ pub(crate) fn outcome_of_poses(
         residual_before: residual_before(before, structure_before.as_ref(), true),
         rejected: Vec::new(),
         candidates: [proposed + found.candidates, proposed + found.detectable],
+        families: Vec::new(),
         interrupted: found.interrupted,
         warnings: ended.warnings,
     };

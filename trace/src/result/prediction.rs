@@ -24,6 +24,12 @@ pub(super) struct Predictions {
 }
 
 impl Predictions {
+    /// Keeps those of some aliases, by their place.
+    pub fn keep(&mut self, is_kept: impl Fn(usize) -> bool) {
+        let mut place = 0..;
+        self.aliases_um.retain(|_| place.next().is_some_and(&is_kept));
+    }
+
     /// Of no test.
     pub fn none(aliases: &[Alias]) -> Predictions {
         Predictions { found_um: None, aliases_um: vec![None; aliases.len()] }

@@ -366,6 +366,11 @@ impl SearchState<'_> {
             self.accepted = self.declared.clone();
             self.withdraw_rejected();
         }
+        self.accept_as_selected();
+    }
+
+    /// Accepts what is selected.
+    pub(super) fn accept_as_selected(&mut self) {
         self.accepted = self.selection.clone();
     }
 }

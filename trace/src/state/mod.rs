@@ -10,6 +10,7 @@ mod objective;
 mod pool;
 mod tuning;
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use abbe_identify::error::IdentifyError;
@@ -87,6 +88,8 @@ pub struct SearchState<'s> {
     /// their positions have a penalty of their own. Curves of last resort, some dozens compared with thousands, do not
     /// count.
     detectable_effects: usize,
+    /// The range of each shape number over the library's members, by identifier.
+    number_ranges: Arc<HashMap<String, Vec<[f64; 2]>>>,
     /// Checked before each model is trained. `None` if the search must not be interrupted.
     pub interrupt: Option<Interrupt<'s>>,
 }
@@ -106,6 +109,7 @@ impl<'s> SearchState<'s> {
         policy: Policy,
     ) -> Result<SearchState<'s>, IdentifyError> {
         let none = Selection::none(columns.fold_rows.len());
+        let number_ranges = Arc::new(pool::number_ranges(&candidates));
         let mut search = SearchState {
             policy,
             columns,
@@ -121,6 +125,7 @@ impl<'s> SearchState<'s> {
             passed_over: Vec::new(),
             rejected: Vec::new(),
             detectable_effects: 0,
+            number_ranges,
             interrupt: None,
         };
         search.judge_detectability()?;

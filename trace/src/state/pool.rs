@@ -6,7 +6,7 @@ use std::sync::Arc;
 use abbe_identify::error::IdentifyError;
 use abbe_identify::numerics::parallel;
 use abbe_model::driver::Driver;
-use abbe_model::effect::Component;
+use abbe_model::effect::{Component, Effect};
 
 use super::SearchState;
 use super::tuning::Tuned;
@@ -14,6 +14,17 @@ use crate::candidates::candidate::Candidate;
 use crate::candidates::gain::TrainedModel;
 use crate::candidates::step_table::{StepTable, best_step_table};
 use crate::constants::MIN_PLAUSIBLE_SIGMA;
+
+/// The range of each shape number over the members of a library, by identifier.
+pub(super) fn number_ranges(library: &[Candidate]) -> HashMap<String, Vec<[f64; 2]>> {
+    let mut ranges: HashMap<String, Vec<[f64; 2]>> = HashMap::new();
+    for member in library {
+        let own = member.brackets();
+        let all = ranges.entry(member.effect.id()).or_insert_with(|| own.clone());
+        all.iter_mut().zip(own).for_each(|(all, [low, high])| *all = [all[0].min(low), all[1].max(high)]);
+    }
+    ranges
+}
 
 impl SearchState<'_> {
     /// Judges for each candidate whether it is detectable at its largest plausible size.
@@ -37,9 +48,12 @@ impl SearchState<'_> {
 
     /// Whether a branch with some training folds may add a candidate now.
     pub fn may_be_added(&self, candidate: usize, folds: &[usize]) -> bool {
-        let Candidate { detectable, dictionary, last_resort, .. } = *self.candidates[candidate];
-        let possible =
-            detectable && !dictionary && (!last_resort || self.last_resort) && self.may_be_used(candidate, folds);
+        let Candidate { detectable, forbidden, dictionary, last_resort, .. } = *self.candidates[candidate];
+        let possible = !forbidden
+            && detectable
+            && !dictionary
+            && (!last_resort || self.last_resort)
+            && self.may_be_used(candidate, folds);
         possible && (self.passed_over.is_empty() || !self.passed_over.contains(&self.kind(candidate)))
     }
 
@@ -96,14 +110,49 @@ impl SearchState<'_> {
         chosen.into_iter().partition(|candidate| self.effect(*candidate).driver == *driver)
     }
 
+    /// The effects whose estimated shape numbers have left the range of the library's members: the readings give the number
+    /// no value, as of a spike that decays before the next reading. `found` are the selected effects as estimated.
+    pub fn beyond_library(&self, found: &[Effect]) -> Vec<String> {
+        let is_beyond = |effect: &Effect| {
+            let ranges = self.number_ranges.get(&effect.id());
+            let outside =
+                |(which, [low, high]): (usize, &[f64; 2])| !(*low..=*high).contains(&effect.shape.number(which));
+            ranges.is_some_and(|ranges| ranges.iter().enumerate().any(outside))
+        };
+        found.iter().filter(|effect| is_beyond(effect)).map(Effect::id).collect()
+    }
+
+    /// Searches some candidates no more, by identifier.
+    pub(super) fn forbid(&mut self, ids: &[String]) {
+        for candidate in self.candidates.iter_mut().filter(|own| ids.contains(&own.effect.id())) {
+            Arc::make_mut(candidate).forbidden = true;
+        }
+    }
+
+    /// Removes effects from every branch, by identifier, and searches them no more.
+    ///
+    /// # Errors
+    /// If products are not finite.
+    pub fn exclude(&mut self, ids: &[String]) -> Result<(), IdentifyError> {
+        self.forbid(ids);
+        let candidates = &self.candidates;
+        for branch in &mut self.selection.branches {
+            branch.selected.retain(|selected| !ids.contains(&candidates[selected.candidate].effect.id()));
+        }
+        self.note_held_out()?;
+        self.accept_as_selected();
+        Ok(())
+    }
+
     /// The step tables from the library's dictionaries for addition to a model.
     ///
     /// # Errors
     /// If products are not finite.
     pub fn step_tables(&self, model: &TrainedModel<'_>) -> Result<Vec<StepTable>, IdentifyError> {
         let variance = self.variance(model);
-        let dictionaries: Vec<usize> =
-            (0..self.candidates.len()).filter(|candidate| self.candidates[*candidate].dictionary).collect();
+        let dictionaries: Vec<usize> = (0..self.candidates.len())
+            .filter(|own| self.candidates[*own].dictionary && !self.candidates[*own].forbidden)
+            .collect();
         let best = |k: usize| best_step_table(model, dictionaries[k], &self.candidates[dictionaries[k]], variance);
         let tables: Vec<Option<StepTable>> =
             parallel::map(dictionaries.len(), &best).into_iter().collect::<Result<_, IdentifyError>>()?;
