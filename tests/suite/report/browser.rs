@@ -270,7 +270,7 @@ fn a_trace_shows_its_values_within_1500_px_and_folds_unaffected_tests() {
     // The simulator changed the axial motion of C only, which C150 alone measures.
     assert_eq!(found["folded"], serde_json::json!([true, true, true, false]), "{found}");
     assert_eq!(found["beside"], true, "{found}");
-    // The selected effect and its 8 alternatives, with their evidence beside them.
-    assert_eq!(found["alternatives"], 9, "{found}");
+    // The selected effect and its 6 alternatives, with their evidence beside them.
+    assert_eq!(found["alternatives"], 7, "{found}");
     assert_eq!(found["right"], true, "{found}");
 }
