@@ -40,3 +40,22 @@ pub fn widest(screen: &str, folder: &Path) -> usize {
 pub fn text(path: &Path) -> &str {
     path.to_str().expect("a path of plain letters")
 }
+
+/// A file of tests that no module declares is not compiled: its tests are switched off without a word.
+#[test]
+fn every_file_is_a_module() {
+    let mut folders = vec![workspace().join("tests/suite")];
+    while let Some(folder) = folders.pop() {
+        let beside = std::fs::read_to_string(folder.with_extension("rs")).unwrap_or_default();
+        let declared = std::fs::read_to_string(folder.join("mod.rs")).unwrap_or_default() + &beside;
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_stem().unwrap().to_str().unwrap().to_string();
+            let is_source = path.extension().is_some_and(|own| own == "rs") && name != "mod";
+            assert!(!is_source || declared.contains(&format!("mod {name};")), "no module declares {}", path.display());
+            if path.is_dir() {
+                folders.push(path);
+            }
+        }
+    }
+}

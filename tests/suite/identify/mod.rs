@@ -27,6 +27,7 @@ pub mod rtest;
 pub mod rtest_command;
 pub mod rtest_findings;
 pub mod self_calibration;
+pub mod set_up_mistakes;
 pub mod simulate;
 pub mod statements;
 pub mod targets;
@@ -35,3 +36,33 @@ pub mod trace_claims;
 pub mod trace_reported;
 pub mod tracker_blunders;
 pub mod validate_command;
+
+use abbe::files::{self, ReadOptions};
+use abbe::model::session::Session;
+
+use crate::plant::{Plan, Recipe};
+
+/// A session in a folder, after a change of the lines of its data files: name of the test, number of the line, cells.
+pub fn session_of(recipe: &Recipe, plan: &Plan, change: impl Fn(&str, usize, &mut Vec<String>)) -> Session {
+    let folder = tempfile::tempdir().unwrap();
+    recipe.draw_on(plan).write(folder.path()).unwrap();
+    for test in &plan.tests {
+        let file = folder.path().join(format!("{}.csv", test.name));
+        let lines = std::fs::read_to_string(&file).unwrap();
+        let changed = lines.lines().enumerate().map(|(number, line)| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_string).collect();
+            change(&test.name, number, &mut cells);
+            cells.join(",") + "\n"
+        });
+        std::fs::write(&file, changed.collect::<String>()).unwrap();
+    }
+    files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap()
+}
+
+/// Changes the last cell of a line of data, the length in mm.
+pub fn with_length(cells: &mut [String], change: impl Fn(f64) -> f64) {
+    let last = cells.last_mut().unwrap();
+    if let Ok(length) = last.parse::<f64>() {
+        *last = format!("{:.4}", change(length));
+    }
+}

@@ -7,24 +7,8 @@ use abbe::identify::plausibility::{Plausibility, SuggestionKind};
 use abbe::model::session::Session;
 use abbe::trace::SessionFit;
 
-use crate::plant::{Cartesian, Component, Driver, Injected, Kind, Plan, Recipe, Shape};
-
-/// A session in a folder, after a change of the lines of its data files: name of the test, number of the line, cells.
-fn session_of(recipe: &Recipe, plan: &Plan, change: impl Fn(&str, usize, &mut Vec<String>)) -> Session {
-    let folder = tempfile::tempdir().unwrap();
-    recipe.draw_on(plan).write(folder.path()).unwrap();
-    for test in &plan.tests {
-        let file = folder.path().join(format!("{}.csv", test.name));
-        let lines = std::fs::read_to_string(&file).unwrap();
-        let changed = lines.lines().enumerate().map(|(number, line)| {
-            let mut cells: Vec<String> = line.split(',').map(str::to_string).collect();
-            change(&test.name, number, &mut cells);
-            cells.join(",") + "\n"
-        });
-        std::fs::write(&file, changed.collect::<String>()).unwrap();
-    }
-    files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap()
-}
+use crate::plant::{Cartesian, Component, Driver, Injected, Kind, Recipe, Shape};
+use crate::suite::identify::{session_of, with_length};
 
 fn as_it_is(recipe: &Recipe) -> Session {
     session_of(recipe, &recipe.plan(), |_, _, _| {})
@@ -32,14 +16,6 @@ fn as_it_is(recipe: &Recipe) -> Session {
 
 fn plausibility(session: &Session) -> Plausibility {
     SessionFit::of(session, 1).unwrap().result.plausibility
-}
-
-/// Changes the last cell of a line of data, the length in mm.
-fn with_length(cells: &mut [String], change: impl Fn(f64) -> f64) {
-    let last = cells.last_mut().unwrap();
-    if let Ok(length) = last.parse::<f64>() {
-        *last = format!("{:.4}", change(length));
-    }
 }
 
 /// A ball that was moved between two tests is moved in all later ones.

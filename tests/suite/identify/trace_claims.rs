@@ -3,12 +3,12 @@
 
 use std::collections::BTreeSet;
 
-use abbe::files::{self, ReadOptions};
 use abbe::identify::results::{EffectResult, TraceResult};
 use abbe::model::session::Session;
 use abbe::trace::{TraceOptions, trace};
 
-use crate::plant::{AxisName, Component, Driver, Freedom, Injected, Kind, Plan, Recipe, Shape};
+use crate::plant::{AxisName, Component, Driver, Freedom, Injected, Kind, Recipe, Shape};
+use crate::suite::identify::{session_of, with_length};
 
 const C: Driver = Driver::Axis(AxisName::C);
 
@@ -18,23 +18,6 @@ fn motion(freedom: Freedom, axis: AxisName) -> Component {
 
 fn harmonic(freedom: Freedom, order: u32, amplitude: f64) -> Injected {
     Injected::new(motion(freedom, AxisName::C), C, Shape::Harmonic { order, phase_deg: 25.0 }, amplitude)
-}
-
-/// A session in a folder, after a change of the lines of its data files: name of the test, number of the line, cells.
-fn session_of(recipe: &Recipe, plan: &Plan, change: impl Fn(&str, usize, &mut Vec<String>)) -> Session {
-    let folder = tempfile::tempdir().unwrap();
-    recipe.draw_on(plan).write(folder.path()).unwrap();
-    for test in &plan.tests {
-        let file = folder.path().join(format!("{}.csv", test.name));
-        let lines = std::fs::read_to_string(&file).unwrap();
-        let changed = lines.lines().enumerate().map(|(number, line)| {
-            let mut cells: Vec<String> = line.split(',').map(str::to_string).collect();
-            change(&test.name, number, &mut cells);
-            cells.join(",") + "\n"
-        });
-        std::fs::write(&file, changed.collect::<String>()).unwrap();
-    }
-    files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap()
 }
 
 fn traced(session: &Session) -> TraceResult {
@@ -47,14 +30,6 @@ fn named(result: &TraceResult) -> Vec<String> {
         format!("{}~{}:{}{order}", effect.name.component, effect.name.driver, effect.name.shape)
     };
     result.effects.iter().map(name).collect()
-}
-
-/// Changes the last cell of a line of data, the length in mm.
-fn with_length(cells: &mut [String], change: impl Fn(f64) -> f64) {
-    let last = cells.last_mut().unwrap();
-    if let Ok(length) = last.parse::<f64>() {
-        *last = format!("{:.4}", change(length));
-    }
 }
 
 /// A circle begins where X reverses. The table came from the other side, so that its first reading has the lost motion of the
@@ -94,6 +69,10 @@ fn shapes_with_the_same_readings_are_one_explanation() {
     for (freedom, order, seed) in [(Freedom::Z, 2, 5), (Freedom::B, 1, 6)] {
         let recipe = Recipe::new(Kind::Rotary, seed).with(harmonic(freedom, order, 3.0));
         let result = traced(&session_of(&recipe, &recipe.plan(), |_, _, _| {}));
+        let heads = |effect: &EffectResult| {
+            effect.variants.len() + effect.aliases.iter().map(|alias| alias.variants.len()).sum::<usize>()
+        };
+        assert!(result.effects.iter().map(heads).sum::<usize>() > 0, "{:#?}", result.effects);
         for effect in &result.effects {
             let all = std::iter::once(&effect.name).chain(effect.aliases.iter().map(|alias| &alias.name));
             let all: Vec<(&str, &str)> = all.map(|name| (name.component.as_str(), name.driver.as_str())).collect();
@@ -102,4 +81,19 @@ fn shapes_with_the_same_readings_are_one_explanation() {
             assert_eq!(effect.explanation_count, all.len());
         }
     }
+}
+
+/// What one reading alone shows after each reversal within a run decays in no width that the readings have: no spike is named for
+/// it.
+#[test]
+fn a_spike_of_one_reading_is_no_effect() {
+    let recipe = Recipe::new(Kind::SquarenessCircles, 5);
+    let session = session_of(&recipe, &recipe.plan(), |_, _, cells| {
+        let x_mm: f64 = cells[2].parse().unwrap_or(0.0);
+        if x_mm < -99.9999 {
+            with_length(cells, |length| length + 6e-3);
+        }
+    });
+    let result = traced(&session);
+    assert!(result.effects.iter().all(|effect| effect.name.shape != "reversal-spike"), "{:?}", named(&result));
 }
