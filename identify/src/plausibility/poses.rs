@@ -1,6 +1,8 @@
 //! Poses of a robot: how much of the variance of the measured positions the model explains, and which column may be
 //! misread.
 
+use std::collections::HashSet;
+
 use abbe_model::axis::AxisKind;
 use abbe_model::session::limits::MIN_UM;
 use abbe_model::session::readings::Readings;
@@ -103,13 +105,8 @@ pub(super) fn suggestions(problem: &Problem) -> Vec<Suggestion> {
     tried.retain(|(left, _)| *left * LOWERED < base);
     tried.sort_by(|a, b| a.0.total_cmp(&b.0));
     // Many tables have one convention.
-    let mut words = Vec::new();
-    tried.retain(|(_, hypothesis)| {
-        !words.contains(&hypothesis.words) && {
-            words.push(hypothesis.words.clone());
-            true
-        }
-    });
+    let mut seen = HashSet::new();
+    tried.retain(|(_, hypothesis)| seen.insert(hypothesis.words.clone()));
     let best = tried.first().map_or(0.0, |(left, _)| *left);
     (tried.into_iter())
         .take_while(|(left, _)| *left <= best * NOT_SEPARABLE)

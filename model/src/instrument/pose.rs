@@ -165,7 +165,7 @@ fn commanded(machine: &Machine, state: &[AxisPosition<f64>]) -> Matrix3<f64> {
 
 /// Quaternions are written with the scalar first or last, poses and rotations in either direction, and three angles by many
 /// conventions.
-const MISREADINGS: [Misreading; 9] = [
+const MISREADINGS: [Misreading; 15] = [
     Misreading {
         columns: "qx, qy, qz, qw",
         words: "the quaternions have the scalar first: their columns are qw, qx, qy, qz in this order",
@@ -191,6 +191,36 @@ const MISREADINGS: [Misreading; 9] = [
         columns: "the rotation",
         words: "the rotations are the inverse ones",
         reread: |values| values[OF_ROTATION].iter_mut().for_each(|value| *value = -*value),
+    },
+    Misreading {
+        columns: "px",
+        words: "px has the opposite sign, and the rotations have not",
+        reread: |values| values[0] = -values[0],
+    },
+    Misreading {
+        columns: "py",
+        words: "py has the opposite sign, and the rotations have not",
+        reread: |values| values[1] = -values[1],
+    },
+    Misreading {
+        columns: "pz",
+        words: "pz has the opposite sign, and the rotations have not",
+        reread: |values| values[2] = -values[2],
+    },
+    Misreading {
+        columns: "rx",
+        words: "the component X of the rotation has the opposite sign",
+        reread: |values| values[3] = -values[3],
+    },
+    Misreading {
+        columns: "ry",
+        words: "the component Y of the rotation has the opposite sign",
+        reread: |values| values[4] = -values[4],
+    },
+    Misreading {
+        columns: "rz",
+        words: "the component Z of the rotation has the opposite sign",
+        reread: |values| values[5] = -values[5],
     },
     Misreading {
         columns: "rx, ry, rz",

@@ -304,11 +304,19 @@ fn a_noise_that_is_not_stated_is_that_of_repeats_or_of_the_residual() {
 #[test]
 fn a_convention_that_explains_poses_is_named() {
     type Written = fn(Isometry3<f64>) -> ([f64; 3], [f64; 3]);
-    let written: [(&str, Written); 5] = [
+    let written: [(&str, Written); 7] = [
         ("as it is", as_it_is),
         ("inverse ones: of the instrument", |pose| as_it_is(pose.inverse())),
         ("rotations are the inverse ones", |pose| {
             (pose.translation.vector.into(), pose.rotation.inverse().scaled_axis().into())
+        }),
+        ("py has the opposite sign, and the rotations have not", |pose| {
+            let (place, angles) = as_it_is(pose);
+            ([place[0], -place[1], place[2]], angles)
+        }),
+        ("the component Z of the rotation has the opposite sign", |pose| {
+            let (place, angles) = as_it_is(pose);
+            (place, [angles[0], angles[1], -angles[2]])
         }),
         ("roll, pitch and yaw", |pose| {
             let (roll, pitch, yaw) = pose.rotation.euler_angles();

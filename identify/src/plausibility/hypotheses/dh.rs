@@ -28,29 +28,32 @@ pub fn conventions(session: &Session) -> Vec<Hypothesis> {
         return Vec::new();
     }
     let signs = 0..1_usize << (count - 1);
-    let ends = [0.0, FRAC_PI_2, -FRAC_PI_2];
-    let standard = signs.clone().flat_map(|signs| ends.map(|end| rows(session, Convention::Standard, signs, end)));
-    let modified = signs.map(|signs| rows(session, Convention::Modified, signs, 0.0));
-    let read = |(convention, rows): (Convention, Vec<DhRow>)| {
-        let (read, other, convention) = match convention {
-            Convention::Standard => ("standard", "modified", Convention::Modified),
-            Convention::Modified => ("modified", "standard", Convention::Standard),
-        };
-        let chain = Table { convention, rows, assumed: Vec::new() }.chain(&machine.name);
-        let mut changed = session.clone();
-        for (axis, joint) in Arc::make_mut(&mut changed.machine).axes.iter_mut().zip(&chain.joints) {
-            axis.direction = (joint.pose.rotation * Vector3::z()).into();
-            axis.origin_mm = joint.pose.translation.vector.into();
-        }
-        let words = format!("the machine is that of a Denavit–Hartenberg table read as {read}, which is {other}");
-        Hypothesis::new(SuggestionKind::DhConvention, &machine.name, words, changed)
+    let in_standard = signs.clone().flat_map(|signs| [0.0, FRAC_PI_2, -FRAC_PI_2].map(|end| (signs, end)));
+    let as_standard = in_standard.map(|(signs, end)| reread(session, Convention::Standard, signs, end));
+    let as_modified = signs.map(|signs| reread(session, Convention::Modified, signs, 0.0));
+    as_standard.chain(as_modified).collect()
+}
+
+/// The session with the machine of the table, which was read in one convention, in the other one.
+fn reread(session: &Session, convention: Convention, signs: usize, end: f64) -> Hypothesis {
+    let (read, is, other) = match convention {
+        Convention::Standard => ("standard", "modified", Convention::Modified),
+        Convention::Modified => ("modified", "standard", Convention::Standard),
     };
-    standard.chain(modified).map(read).collect()
+    let rows = rows(session, convention, signs, end);
+    let chain = Table { convention: other, rows, assumed: Vec::new() }.chain(&session.machine.name);
+    let mut changed = session.clone();
+    for (axis, joint) in Arc::make_mut(&mut changed.machine).axes.iter_mut().zip(&chain.joints) {
+        axis.direction = (joint.pose.rotation * Vector3::z()).into();
+        axis.origin_mm = joint.pose.translation.vector.into();
+    }
+    let words = format!("the machine is that of a Denavit–Hartenberg table read as {read}, which is {is}");
+    Hypothesis::new(SuggestionKind::DhConvention, &session.machine.name, words, changed)
 }
 
 /// The rows of the table in the convention that it was read in: bit `k` of `signs` is the sign of the X axis between axes `k` and
 /// `k + 1`, `end` the angle behind the last axis.
-fn rows(session: &Session, convention: Convention, signs: usize, end: f64) -> (Convention, Vec<DhRow>) {
+fn rows(session: &Session, convention: Convention, signs: usize, end: f64) -> Vec<DhRow> {
     let axes = &session.machine.axes;
     let (z, origin) = (|k: usize| Vector3::from(axes[k].direction), |k: usize| Vector3::from(axes[k].origin_mm));
     let angle =
@@ -76,5 +79,5 @@ fn rows(session: &Session, convention: Convention, signs: usize, end: f64) -> (C
         let ([a, alpha], [theta, d]) = (across[k + first], along[k]);
         DhRow { kind: Some(axes[k].kind), a, alpha, theta, d, ..DhRow::default() }
     };
-    (convention, (0..axes.len()).map(row).collect())
+    (0..axes.len()).map(row).collect()
 }
