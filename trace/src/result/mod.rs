@@ -71,7 +71,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
     let mut predicted = Vec::new();
     let mut costs = Vec::new();
     let (mut covered, mut variants) = (Vec::new(), Vec::new());
-    let variance = residual_variance(search, before, findings.after_fit);
+    let variance = residual_variance(findings);
     for (k, taken) in search.selected().iter().enumerate() {
         let model = search.model_without(Some(k))?;
         let (mut aliases, of_effect) = alias::aliases(search, k, &model, variance)?;
@@ -193,12 +193,12 @@ impl<'s> HeldOut<'s> {
 
 /// Variance for the comparison of aliases, relative to that of the noise. For poses it is that of the remaining
 /// residual.
-pub(super) fn residual_variance(search: &SearchState<'_>, before: &Problem, after_fit: &Fit) -> f64 {
-    if !search.policy.in_residual_variance {
+fn residual_variance(findings: &TraceFindings<'_>) -> f64 {
+    if !findings.search.policy.in_residual_variance {
         return 1.0;
     }
     // The evidence uses the noise of the search.
-    relative_variance(&after_fit.residuals, before.noise.sigma_mm, search.columns.rows())
+    relative_variance(&findings.after_fit.residuals, findings.before.noise.sigma_mm, findings.search.columns.rows())
 }
 
 /// Variance of residuals, by test, mm, over that of the noise; at least 1. `rows` is the number of residuals that count.
