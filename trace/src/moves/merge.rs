@@ -1,4 +1,4 @@
-//! Merges effects that follow one axis into one effect.
+//! Merges effects that follow one axis, or waves along several axes, into one effect.
 
 use abbe_identify::error::IdentifyError;
 use abbe_identify::numerics::parallel;
@@ -7,7 +7,8 @@ use super::{Move, Proposal};
 use crate::state::{SearchBranch, SearchState, SelectedEffect};
 
 /// Merges several effects that follow one axis, or all of them but one, into one effect, if it explains as much with a
-/// shorter description. For three or more effects or positions, a nonparametric curve is a candidate too.
+/// shorter description. For three or more effects or positions, a nonparametric curve is a candidate too. Several waves with
+/// periods, along any axes, are one group too: a harmonic of a rotary axis that linear axes follow looks like waves of theirs.
 pub struct Merge;
 
 impl Move for Merge {
@@ -28,6 +29,10 @@ impl Move for Merge {
                     break;
                 }
             }
+        }
+        let waves = search.waves(branch);
+        if let Some(proposal) = (waves.len() > 1).then(|| merged(search, branch, &waves)).transpose()?.flatten() {
+            changed |= proposal.accept(search, branch);
         }
         Ok(changed)
     }

@@ -16,8 +16,8 @@ pub struct Harmonic {
     pub order: f64,
 }
 
-/// Highest order of the library.
-const HIGHEST_ORDER: usize = 120;
+/// Highest order of the library: twice the teeth of the worm wheels of rotary tables, as far as the readings resolve it.
+const HIGHEST_ORDER: usize = 360;
 /// Highest order for poses, which sample an axis at random. An independent search found no significant order above it.
 const HIGHEST_ORDER_OF_POSES: usize = 40;
 
@@ -39,14 +39,17 @@ pub(super) const ENTRY: Entry = Entry {
 fn highest_order(sampled: &Sampled) -> usize {
     if sampled.poses {
         HIGHEST_ORDER_OF_POSES
-    } else if sampled.step > 0.0 {
-        ((TAU / (READINGS_PER_CYCLE * sampled.step)) as usize).clamp(1, HIGHEST_ORDER)
     } else {
-        0
+        Harmonic::resolved(sampled).min(HIGHEST_ORDER)
     }
 }
 
 impl Harmonic {
+    /// The highest order that readings along runs resolve; 0 without runs.
+    pub(super) fn resolved(sampled: &Sampled) -> usize {
+        if sampled.step > 0.0 { ((TAU / (READINGS_PER_CYCLE * sampled.step)) as usize).max(1) } else { 0 }
+    }
+
     /// The members of the library up to an order. There are many high orders, and each single one is unlikely. The cost
     /// therefore grows as the logarithm of the order.
     pub fn up_to(most: usize) -> Vec<(Shape, f64)> {

@@ -14,7 +14,7 @@
 //! harmonics have four (the full spectrum of D. E. Bently and C. T. Hatch, *Fundamentals of Rotating Machinery
 //! Diagnostics*, 2002). ISO 230-7 calls the errors tilt and radial error motion.
 
-use super::harmonic::{ORDER, times};
+use super::harmonic::{Harmonic, ORDER, times};
 use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind, positive};
 use super::words::EffectWords;
 use super::{DriverSample, Key, KeyForm, KeyWriter, Shape};
@@ -50,10 +50,11 @@ pub(super) const ENTRY: Entry = Entry {
     members: |sampled| members(sampled),
 };
 
-/// Along a run of one axis an instrument mostly reads one direction, in which a precession is a harmonic. Independent
-/// poses read both.
+/// Along a run of one axis an instrument may read one direction alone, in which a precession is a harmonic: each then names
+/// the other as an alias.
 fn members(sampled: &Sampled) -> Vec<(Shape, f64)> {
-    let most = if sampled.poses && sampled.rotary { HIGHEST_ORDER } else { 0 };
+    let resolved = if sampled.poses { HIGHEST_ORDER } else { Harmonic::resolved(sampled) };
+    let most = if sampled.rotary { resolved.min(HIGHEST_ORDER) } else { 0 };
     let of_order = |order: usize| {
         let order = order as f64;
         [false, true].map(|backward| (Shape::Precession(Precession { order, backward }), order.ln()))
