@@ -82,6 +82,8 @@ pub fn report(
     conformity::section(&mut report, result.conformity.as_ref());
     let by_prior = &result.outcome.determined_by_prior;
     confounded::section(&mut report, &result.unobservable, by_prior, (&result.outliers, result.reading_unit));
+    let presumed = "Location errors that rest on the absence of a motion, which no reading separates from them:";
+    report.headed(Level::Detail, presumed, Text::List(result.presumed.clone()));
     report.section("Next");
     report.headed(Level::Key, "Tests that separate an effect from its aliases:", Text::List(measure_next(result)));
     let page = "write residuals, plots and alternatives as a page";

@@ -37,7 +37,7 @@ pub(super) struct Alias {
 
 impl Alias {
     /// `ln` of its probability over that of the found effect, by likelihood and mechanical plausibility.
-    fn ln_probability_ratio(&self) -> f64 {
+    pub fn ln_probability_ratio(&self) -> f64 {
         -0.5 * self.delta_chi2 - self.prior_cost
     }
 }
@@ -155,6 +155,7 @@ pub(super) fn aliases(
                 && !search.candidates[*candidate].last_resort
                 && search.may_be_added(*candidate, &model.folds)
                 && gain.freedom > 0
+                && !search.is_beyond_library(search.effect(*candidate))
                 && (search.evidence_for(*candidate, gain, variance) >= least
                     || !has_positions && search.evidence(gain, variance) >= least_unpriced
                     || no_more_said(*candidate) && gain.gain / variance >= least_gain(*candidate))
@@ -203,7 +204,10 @@ fn mark_variants(
         Ok(alike && model.difference_square([one, other])? < same)
     };
     let mut order: Vec<usize> = (0..aliases.len()).collect();
-    order.sort_by_key(|place| search.gram.numbers(aliases[*place].candidate));
+    order.sort_by_key(|place| {
+        let own = aliases[*place].candidate;
+        (search.gram.numbers(own), matches!(search.effect(own).shape, Shape::Precession(_)))
+    });
     let mut heads = vec![found];
     for place in order {
         let own = aliases[place].candidate;

@@ -63,25 +63,20 @@ pub(super) fn search_and_refit(
     record: &mut SearchRecord<'_>,
     judge: impl Fn(&SearchState<'_>) -> Result<RefittedModel, IdentifyError>,
 ) -> Result<(f64, RefittedModel), IdentifyError> {
-    let mut ended = search_on(search, record)?;
-    (record.progress)(Progress::Judging);
-    let mut judged = judge(search)?;
-    if judged.is_structured() && search.selected().len() < search.policy.max_effects {
-        search.last_resort = true;
-        ended = search_on(search, record)?;
-        if !judged.is_of(search) {
-            judged = judge(search)?;
-        }
+    let (mut ended, mut judged) = search_to_curves(search, record, &judge)?;
+    if let Some(smooth) = with_smooth_shapes(search, record, &judge)? {
+        (ended, judged) = smooth;
     }
     // An effect whose number has no value in these readings is no effect of its own.
     loop {
-        let beyond = search.beyond_library(judged.estimated(search));
+        let found = judged.estimated(search).iter();
+        let beyond: Vec<String> = found.filter(|effect| search.is_beyond_library(effect)).map(Effect::id).collect();
         if beyond.is_empty() {
             break;
         }
-        search.exclude(&beyond)?;
-        ended = search_on(search, record)?;
-        judged = judge(search)?;
+        search.restart_without(&beyond);
+        record.steps.clear();
+        (ended, judged) = search_to_curves(search, record, &judge)?;
     }
     if search.policy.withdraws {
         moves::on_every_branch(&Withdraw { structured: judged.is_structured() }, search)?;
@@ -92,6 +87,46 @@ pub(super) fn search_and_refit(
         }
     }
     Ok((ended, judged))
+}
+
+/// Searches and refits, with nonparametric curves if structure remains without them.
+fn search_to_curves(
+    search: &mut SearchState<'_>,
+    record: &mut SearchRecord<'_>,
+    judge: &impl Fn(&SearchState<'_>) -> Result<RefittedModel, IdentifyError>,
+) -> Result<(f64, RefittedModel), IdentifyError> {
+    let mut ended = search_on(search, record)?;
+    (record.progress)(Progress::Judging);
+    let mut judged = judge(search)?;
+    if judged.is_structured() && search.selected().len() < search.policy.max_effects {
+        search.last_resort = true;
+        ended = search_on(search, record)?;
+        if !judged.is_of(search) {
+            judged = judge(search)?;
+        }
+    }
+    Ok((ended, judged))
+}
+
+/// Searches once more without the staircases that were found: with enough steps they approximate any shape. A staircase stays
+/// if the objective of the whole model is higher than without it. Otherwise the model of the other shapes takes its place, and is
+/// returned.
+fn with_smooth_shapes(
+    search: &mut SearchState<'_>,
+    record: &mut SearchRecord<'_>,
+    judge: &impl Fn(&SearchState<'_>) -> Result<RefittedModel, IdentifyError>,
+) -> Result<Option<(f64, RefittedModel)>, IdentifyError> {
+    if !search.has_staircase() {
+        return Ok(None);
+    }
+    let (found, steps, strongest) = (search.clone(), std::mem::take(&mut record.steps), record.strongest.clone());
+    search.restart_without(&search.staircases());
+    search_on(search, record)?;
+    if found.objective_of_selected()? > search.objective_of_selected()? {
+        (*search, record.steps, record.strongest) = (found, steps, strongest);
+        return Ok(None);
+    }
+    search_to_curves(search, record, judge).map(Some)
 }
 
 /// Runs rounds until no candidate is significant, or until additions do not lower the held-out error. The accepted

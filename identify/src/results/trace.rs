@@ -163,7 +163,7 @@ pub struct AliasResult {
     /// Likelihood with the alias over likelihood with the found effect: exp(−`delta_chi2`/2).
     pub likelihood_ratio: f64,
     /// Prior cost of the alias less that of the found effect, −ln of a probability: how much less plausible it is
-    /// mechanically.
+    /// mechanically, and 2 for each further number of its shape.
     pub prior_cost: f64,
     /// Probability of the alias over that of the found effect: `likelihood_ratio` · exp(−`prior_cost`).
     pub probability_ratio: f64,
@@ -377,6 +377,9 @@ pub struct TraceResult {
     /// The families of effects of these candidates: what is unique is unique among them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub families: Vec<String>,
+    /// What location errors of rotary axes rest on: motions of their axes that the readings do not separate from them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub presumed: Vec<String>,
     /// The null-space directions of the model with the found effects, in words.
     pub unobservable: Vec<Unobservable>,
     /// The null space of the model with the found effects, as a matrix.

@@ -39,11 +39,20 @@ pub(super) struct Statements {
     pub rejected: Vec<RejectedCandidate>,
     /// Number of candidates, and of those that the readings would show.
     pub candidates: [usize; 2],
-    /// The families of these.
-    pub families: Vec<String>,
+    /// The families of these, and the motions that location errors rest on.
+    pub searched: Searched,
     pub interrupted: bool,
     /// Warnings of the search.
     pub warnings: Vec<String>,
+}
+
+/// What a search covers, and what it cannot.
+#[derive(Clone, Debug, Default)]
+pub(in crate::result) struct Searched {
+    /// The families of effects of its candidates.
+    pub families: Vec<String>,
+    /// Motions of rotary axes that no reading separates from their location errors, in words.
+    pub presumed: Vec<String>,
 }
 
 /// The result with the declared model `before` and the model `after` with the found effects, which `effects` describes by
@@ -91,7 +100,8 @@ pub(super) fn build(
         rejected_candidates: rejected,
         candidates: candidates[0],
         candidates_detectable: candidates[1],
-        families: statements.families,
+        families: statements.searched.families,
+        presumed: statements.searched.presumed,
         unobservable: fit::unobservable(problem, &fit.rank),
         null_space: fit::null_space(problem, &fit.rank),
         outliers: fit::outliers(problem, fit),
@@ -118,7 +128,7 @@ pub(crate) fn unsearched(problem: &Problem, fit: &Fit) -> Result<TraceResult, Id
         remainder,
         rejected: Vec::new(),
         candidates: [0, 0],
-        families: Vec::new(),
+        searched: Searched::default(),
         interrupted: false,
         warnings: Vec::new(),
     };

@@ -14,17 +14,24 @@ use abbe_identify::fit::{self, Fit, prepare_with};
 use abbe_identify::heldout::cross_validation;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{ChangedParameter, EffectResult, ModelResult, OfAngles, ParameterResult, TraceResult};
-use abbe_model::effect::Effect;
+use abbe_model::component::{ErrorKind, ErrorName};
+use abbe_model::effect::{Component, Effect, Shape};
+use abbe_model::words::listed;
 
 use super::alias::{self, Alias, CompetingEffect};
 use super::remainder::Structure;
-use super::state::SearchState;
+use super::state::{ALL, SearchState};
+use crate::candidates::gain::Projected;
 use crate::candidates::library;
+use crate::constants::MORE_PROBABLE;
 pub(super) use build::unsearched;
-use build::{Model, Statements, build};
+use build::{Model, Searched, Statements, build};
 pub use effect::effect_name;
 pub(super) use poses::{PosesEnded, outcome_of_poses};
 use verdict::verdict;
+
+/// Share of a signal that remains beside the declared model below which the model contains it.
+const CONTAINED: f64 = 0.01;
 
 /// The end state of a search.
 pub(super) struct TraceFindings<'f> {
@@ -72,18 +79,25 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
     let mut costs = Vec::new();
     let (mut covered, mut variants) = (Vec::new(), Vec::new());
     let variance = residual_variance(findings);
+    let folds = &search.selection.branches[ALL].folds;
     for (k, taken) in search.selected().iter().enumerate() {
-        let model = search.model_without(Some(k))?;
+        // Beside the explanations that are named of the effects before it.
+        let before_it = chosen_candidates.iter().map(|(candidate, _)| *candidate);
+        let after_it = search.selected()[k + 1..].iter().map(|selected| selected.candidate);
+        let model = search.model_of(&before_it.chain(after_it).collect::<Vec<_>>(), folds)?;
         let (mut aliases, of_effect) = alias::aliases(search, k, &model, variance)?;
         let mut of_tests = prediction::predictions(findings, k, &mut aliases)?;
         competing_effects.push(of_effect);
-        let chosen = assumed(findings, taken.candidate, &mut aliases);
-        if chosen.is_some_and(|candidate| candidate != taken.candidate) {
+        let assumed = assumed(findings, taken.candidate, &aliases);
+        let place = assumed.unwrap_or_else(|| most_probable(&aliases, &of_tests));
+        let found = place.map_or(taken.candidate, |place| exchange(taken.candidate, place, &mut aliases));
+        match (place, assumed) {
             // The left-out tests were predicted with the other effect in the model.
-            of_tests = prediction::Predictions::none(&aliases);
+            (Some(_), Some(_)) => of_tests = prediction::Predictions::none(&aliases),
+            (Some(place), None) => of_tests.exchange(place),
+            (None, _) => {}
         }
-        let found = chosen.unwrap_or(taken.candidate);
-        chosen_candidates.push((found, chosen.is_some()));
+        chosen_candidates.push((found, assumed.is_some()));
         let effect_of = |alias: &Alias| search.effect(alias.candidate).clone();
         // Uncertainties cover variants too.
         covered.push(aliases.iter().map(effect_of).collect::<Vec<Effect>>());
@@ -131,7 +145,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
         residual_before: residual_before(before, findings.structure_before, !search.selected().is_empty()),
         rejected: rejected::candidates(&before.session.machine, search, &held_out),
         candidates: [findings.candidates, findings.candidates_seen],
-        families: searched_families(search, &families),
+        searched: Searched { families: searched_families(search, &families), presumed: presumed(search, before)? },
         interrupted: findings.interrupted,
         warnings,
     };
@@ -146,6 +160,40 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
 fn searched_families(search: &SearchState<'_>, families: &[library::Family]) -> Vec<String> {
     let has_members = |number: usize| search.candidates.iter().any(|own| own.family == number && own.detectable);
     families.iter().enumerate().filter(|(number, _)| has_members(*number)).map(|(_, own)| own.name.clone()).collect()
+}
+
+/// The precessions of rotary axes that the declared model contains, with the location errors that rest on their absence: a
+/// forward precession of order 2 reads as a constant tilt.
+fn presumed(search: &SearchState<'_>, before: &Problem) -> Result<Vec<String>, IdentifyError> {
+    let list = &before.parameters.list;
+    let declared = search.model_of(&[], &search.selection.branches[ALL].folds)?;
+    let mut found: Vec<(Vec<&str>, Vec<String>)> = Vec::new();
+    for (number, candidate) in search.candidates.iter().enumerate().filter(|(_, own)| own.tuned_on.is_empty()) {
+        let effect = &candidate.effect;
+        let (Shape::Precession(_), Component::Axis(name)) = (&effect.shape, &effect.component) else { continue };
+        let Projected { d, own, .. } = declared.projected(number)?;
+        let has_signal = (0..own.nrows()).all(|k| own[(k, k)] > 1.0);
+        if !has_signal || (0..d.nrows()).any(|k| d[(k, k)] > CONTAINED * own[(k, k)]) {
+            continue;
+        }
+        let is_of_axis = |id: &str| {
+            ErrorName::parse(id).is_some_and(|error| {
+                error.kind == ErrorKind::Location
+                    && error.axis == name.axis
+                    && error.freedom.is_angle() == name.freedom.is_angle()
+            })
+        };
+        let errors: Vec<&str> = list.iter().map(|own| own.id.as_str()).filter(|id| is_of_axis(id)).collect();
+        match found.iter_mut().find(|(same, _)| *same == errors) {
+            _ if errors.is_empty() => {}
+            Some((_, precessions)) => precessions.push(effect.id()),
+            None => found.push((errors, vec![effect.id()])),
+        }
+    }
+    let words = |(errors, precessions): &(Vec<&str>, Vec<String>)| {
+        format!("{} presume that there is no {}", listed(errors, "and"), listed(precessions, "or"))
+    };
+    Ok(found.iter().map(words).collect())
 }
 
 /// The structure of the residual of the declared model, in words.
@@ -270,23 +318,44 @@ fn not_assumed(findings: &TraceFindings<'_>, after: &Problem) -> Vec<String> {
     open.map(|id| format!("\"{id}\" is not assumed: no effect that was found is explained by it")).collect()
 }
 
-/// The candidate that the user accepts as the explanation of an effect; `None` if it is none of these. If it is an alias,
-/// the found effect takes its place among the aliases.
-fn assumed(findings: &TraceFindings<'_>, found: usize, aliases: &mut Vec<Alias>) -> Option<usize> {
-    let id = |candidate: usize| findings.search.effect(candidate).id();
-    if findings.assume.contains(&id(found)) {
-        return Some(found);
+/// Whether the user accepts an explanation of an effect, and its place among the aliases if it is not the found effect.
+fn assumed(findings: &TraceFindings<'_>, found: usize, aliases: &[Alias]) -> Option<Option<usize>> {
+    let is_assumed = |candidate: usize| findings.assume.contains(&findings.search.effect(candidate).id());
+    if is_assumed(found) {
+        return Some(None);
     }
-    let place = aliases.iter().position(|alias| findings.assume.contains(&id(alias.candidate)))?;
+    aliases.iter().position(|alias| is_assumed(alias.candidate)).map(Some)
+}
+
+/// The place of the alias that is more probable than the found effect, and that predicts left-out tests no worse.
+fn most_probable(aliases: &[Alias], of_tests: &prediction::Predictions) -> Option<usize> {
+    let ratio = |place: &usize| aliases[*place].ln_probability_ratio();
+    (0..aliases.len())
+        .filter(|place| aliases[*place].variant_of.is_none() && ratio(place) > MORE_PROBABLE)
+        .filter(|place| !of_tests.is_worse(*place))
+        .max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
+}
+
+/// Names the alias at a place in place of the found effect, which becomes the first of the aliases. Returns its candidate.
+fn exchange(found: usize, place: usize, aliases: &mut Vec<Alias>) -> usize {
     let chosen = aliases.remove(place);
+    let is_variant = chosen.variant_of == Some(found);
     for alias in aliases.iter_mut() {
         alias.delta_chi2 -= chosen.delta_chi2;
         alias.prior_cost -= chosen.prior_cost;
+        if is_variant && alias.variant_of == Some(found) {
+            alias.variant_of = Some(chosen.candidate);
+        }
     }
-    let replaced =
-        Alias { candidate: found, delta_chi2: -chosen.delta_chi2, prior_cost: -chosen.prior_cost, ..chosen.clone() };
+    let replaced = Alias {
+        candidate: found,
+        delta_chi2: -chosen.delta_chi2,
+        prior_cost: -chosen.prior_cost,
+        variant_of: is_variant.then_some(chosen.candidate),
+        ..chosen
+    };
     aliases.insert(0, replaced);
-    Some(chosen.candidate)
+    chosen.candidate
 }
 
 /// The model with the found effects, which now have their aliases: uncertainties cover these, unless the effect is

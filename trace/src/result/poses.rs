@@ -11,7 +11,7 @@ use faer::{Mat, Side};
 
 use super::effect::{described, explained_by};
 use super::verdict::of_poses;
-use super::{Model, Statements, build, residual_before};
+use super::{Model, Searched, Statements, build, residual_before};
 use crate::poses::{AcceptedEffect, PoseSearch};
 use crate::remainder::Structure;
 use crate::{SearchStep, TraceOutcome};
@@ -67,7 +67,7 @@ pub(crate) fn outcome_of_poses(
         residual_before: residual_before(before, structure_before.as_ref(), true),
         rejected: Vec::new(),
         candidates: [proposed + found.candidates, proposed + found.detectable],
-        families: Vec::new(),
+        searched: Searched::default(),
         interrupted: found.interrupted,
         warnings: ended.warnings,
     };

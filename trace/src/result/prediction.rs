@@ -15,6 +15,9 @@ use super::TraceFindings;
 use crate::alias::Alias;
 use crate::constants::{INDISTINGUISHABLE, MAX_PREDICTING};
 
+/// Ratio of the left-out-test errors from which an alias predicts worse.
+const WORSE: f64 = 1.01;
+
 /// The left-out-test errors of a found effect and its aliases.
 pub(super) struct Predictions {
     /// Rms of the left-out tests with the found effect, µm. `None` if no test can be left out.
@@ -28,6 +31,21 @@ impl Predictions {
     pub fn keep(&mut self, is_kept: impl Fn(usize) -> bool) {
         let mut place = 0..;
         self.aliases_um.retain(|_| place.next().is_some_and(&is_kept));
+    }
+
+    /// Whether an alias predicts worse than the found effect, by its place.
+    pub fn is_worse(&self, place: usize) -> bool {
+        let of_alias = self.aliases_um.get(place).copied().flatten();
+        of_alias.zip(self.found_um).is_some_and(|(alias, found)| alias > WORSE * found)
+    }
+
+    /// Exchanges the found effect for an alias: it becomes the first alias.
+    pub fn exchange(&mut self, place: usize) {
+        if place < self.aliases_um.len() {
+            let of_alias = self.aliases_um.remove(place);
+            self.aliases_um.insert(0, self.found_um);
+            self.found_um = of_alias;
+        }
     }
 
     /// Of no test.

@@ -334,6 +334,16 @@ impl SearchState<'_> {
         self.unwhitened.units.decrease(before, &after.held_out, &after.of_all)
     }
 
+    /// Starts anew from the declared model, without some candidates, by identifier.
+    pub fn restart_without(&mut self, ids: &[String]) {
+        self.forbid(ids);
+        self.selection = self.declared.clone();
+        self.accepted = self.declared.clone();
+        self.thresholds.clear();
+        self.rejected.clear();
+        self.last_resort = false;
+    }
+
     /// Whether nothing is selected, or the held-out error is below that of the declared model by more than the standard
     /// error of the decrease.
     fn lowers_heldout_error(&self) -> bool {
@@ -366,11 +376,6 @@ impl SearchState<'_> {
             self.accepted = self.declared.clone();
             self.withdraw_rejected();
         }
-        self.accept_as_selected();
-    }
-
-    /// Accepts what is selected.
-    pub(super) fn accept_as_selected(&mut self) {
         self.accepted = self.selection.clone();
     }
 }

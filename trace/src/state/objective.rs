@@ -67,6 +67,12 @@ impl SearchState<'_> {
         Ok(self.evidence_of(group, rest, folds)? - self.description_length(group))
     }
 
+    /// The objective of the selected effects.
+    pub fn objective_of_selected(&self) -> Result<f64, IdentifyError> {
+        let chosen = self.selection.branches[ALL].chosen();
+        if chosen.is_empty() { Ok(0.0) } else { self.objective(&chosen, &[], &self.selection.branches[ALL].folds) }
+    }
+
     /// The objective of some candidates and one more, which need not be in the base.
     pub fn objective_with(&self, some: &[usize], one: usize, folds: &[usize]) -> Result<f64, IdentifyError> {
         let model = self.model_of(some, folds)?;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use abbe_identify::error::IdentifyError;
 use abbe_identify::numerics::parallel;
 use abbe_model::driver::Driver;
-use abbe_model::effect::{Component, Effect};
+use abbe_model::effect::{Component, Effect, Shape};
 
 use super::SearchState;
 use super::tuning::Tuned;
@@ -110,16 +110,17 @@ impl SearchState<'_> {
         chosen.into_iter().partition(|candidate| self.effect(*candidate).driver == *driver)
     }
 
-    /// The effects whose estimated shape numbers have left the range of the library's members: the readings give the number
-    /// no value, as of a spike that decays before the next reading. `found` are the selected effects as estimated.
-    pub fn beyond_library(&self, found: &[Effect]) -> Vec<String> {
-        let is_beyond = |effect: &Effect| {
-            let ranges = self.number_ranges.get(&effect.id());
-            let outside =
-                |(which, [low, high]): (usize, &[f64; 2])| !(*low..=*high).contains(&effect.shape.number(which));
-            ranges.is_some_and(|ranges| ranges.iter().enumerate().any(outside))
-        };
-        found.iter().filter(|effect| is_beyond(effect)).map(Effect::id).collect()
+    /// The selected waves of a branch with periods.
+    pub fn waves(&self, branch: usize) -> Vec<usize> {
+        let chosen = self.selection.branches[branch].chosen();
+        chosen.into_iter().filter(|candidate| matches!(self.effect(*candidate).shape, Shape::Periodic(_))).collect()
+    }
+
+    /// Whether a shape number of an effect is outside the range of the library's members: the readings give the number no
+    /// value, as of a spike that decays before the next reading, or over more than the travel.
+    pub fn is_beyond_library(&self, effect: &Effect) -> bool {
+        let outside = |(which, [low, high]): (usize, &[f64; 2])| !(*low..=*high).contains(&effect.shape.number(which));
+        self.number_ranges.get(&effect.id()).is_some_and(|ranges| ranges.iter().enumerate().any(outside))
     }
 
     /// Searches some candidates no more, by identifier.
@@ -129,19 +130,15 @@ impl SearchState<'_> {
         }
     }
 
-    /// Removes effects from every branch, by identifier, and searches them no more.
-    ///
-    /// # Errors
-    /// If products are not finite.
-    pub fn exclude(&mut self, ids: &[String]) -> Result<(), IdentifyError> {
-        self.forbid(ids);
-        let candidates = &self.candidates;
-        for branch in &mut self.selection.branches {
-            branch.selected.retain(|selected| !ids.contains(&candidates[selected.candidate].effect.id()));
-        }
-        self.note_held_out()?;
-        self.accept_as_selected();
-        Ok(())
+    /// Whether a selected effect has several steps.
+    pub fn has_staircase(&self) -> bool {
+        self.selected().iter().any(|selected| self.effect(selected.candidate).shape.positions().len() > 1)
+    }
+
+    /// The identifiers of all staircases that the search can form.
+    pub fn staircases(&self) -> Vec<String> {
+        let has_positions = |own: &&Arc<Candidate>| own.dictionary && !own.effect.shape.positions().is_empty();
+        self.candidates.iter().filter(has_positions).map(|own| own.effect.id()).collect()
     }
 
     /// The step tables from the library's dictionaries for addition to a model.

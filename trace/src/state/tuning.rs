@@ -257,11 +257,7 @@ impl SearchState<'_> {
         let Candidate { selection_penalty, ref effect, ref columns, .. } = *self.candidates[original];
         let mut effect = effect.clone();
         let channel = TunedChannel::of(self.columns, tuning, columns);
-        // Tuning one after another does not leave the range of the library.
-        let mut brackets = self.candidates[original].brackets();
-        if let Some(ranges) = self.number_ranges.get(&effect.id()) {
-            brackets.iter_mut().zip(ranges).for_each(|(own, all)| *own = [own[0].max(all[0]), own[1].min(all[1])]);
-        }
+        let brackets = self.candidates[original].brackets();
         let mut best = before;
         let steps = self.effort(&model.folds).line_search;
         // The numbers of one shape are tuned in turn.
