@@ -88,7 +88,7 @@ const SAME_NOISE: f64 = 0.1;
 
 /// Whether the noise of the search is not that of a fit: repeats contradict the stated noise, or beside waves that vary from
 /// run to run they give another standard deviation.
-fn noise_is_from_search(search: &Problem, fit: &Problem) -> bool {
+pub(super) fn noise_is_from_search(search: &Problem, fit: &Problem) -> bool {
     let (of_search, of_fit) = (&search.noise, &fit.noise);
     let of_one_size = (of_search.sigma_mm / of_fit.sigma_mm - 1.0).abs() < SAME_NOISE;
     match (of_search.source, of_fit.source) {

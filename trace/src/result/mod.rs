@@ -19,6 +19,7 @@ use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::words::listed;
 
 use super::alias::{self, Alias, CompetingEffect};
+use super::judge::noise_is_from_search;
 use super::remainder::Structure;
 use super::state::{ALL, SearchState};
 use crate::candidates::gain::Projected;
@@ -379,8 +380,8 @@ fn with_aliases(
     let as_found = search.selected().iter().zip(chosen).all(|(found, chosen)| found.candidate == chosen.0);
     if !as_found {
         let (mut after, mut fitted) = prepare_with(&findings.before.session, &effects, findings.seed)?;
-        if after.noise != findings.after.noise {
-            after.noise = findings.after.noise.clone();
+        if noise_is_from_search(findings.before, &after) {
+            after.noise = findings.before.noise.clone();
             fitted = fit::refit(&mut after, &fitted)?;
         }
         return Ok((after, fitted));
