@@ -49,7 +49,7 @@ def fleet(tmp_path_factory):
         places = [sessions / f"M{machine}" / f"{month:02}" for machine in range(4)]
         measure(places[0], "M0", dates[0], month + 1, values={"EX0C": 10.0 + 0.4 * month})
         measure(places[1], "M1", dates[1], month + 11, {"noise_um": 0.5})
-        measure(places[2], "M2", dates[2], month + 21, effect=("EXC", 4, 3.0))
+        measure(places[2], "M2", dates[2], month + 21, effect=("EZC", 2, 3.0))
         other = {"errors": ("EX0C", "EY0C", "EZ0C"), "z_mm": 75 if month >= 2 else 0}
         measure(places[3], "M3", dates[3], month + 31, other, effect=("EXC", 3, 2.0) if month in (2, 3) else None)
         if month >= 4:
@@ -129,7 +129,7 @@ def frequent_effects(records):
     own = effects(records)
     meanings = {effect["id"]: effect["meaning"] for _, effect in own}
     found = most_frequent([(record["machine"]["code"], effect["id"], record["machine_id"]) for record, effect in own])
-    assert [row[1:] for row in found] == [("EXC~C:h4", 1, MONTHS), ("EXC~C:h3", 1, 2)]
+    assert [row[1:] for row in found] == [("EZC~C:h2", 1, MONTHS), ("EXC~C:h3", 1, 2)]
     return [(code, id, meanings[id], machines, count) for code, id, machines, count in found]
 
 
@@ -139,7 +139,7 @@ def frequent_sets(records):
         for record, effect in effects(records)
     ]
     found = most_frequent(rows)
-    assert found[0][1] == ("EBC~C:h4", "EXC~C:h4")
+    assert found[0][1] == ("EZ0A~C:h2", "EZC~C:h2")
     return [(code, list(names), machines, count) for code, names, machines, count in found]
 
 

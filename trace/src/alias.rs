@@ -162,7 +162,11 @@ pub(super) fn aliases(
         })
         .map(|(candidate, gain)| (candidate, gain.gain))
         .collect();
-    let cost = |candidate: usize| prior_cost(search.effect(candidate));
+    // The costs of the search, and a tuned number counts as much as in the comparison above.
+    let cost = |candidate: usize| {
+        let description = search.candidates[candidate].cost + INDISTINGUISHABLE * numbers(candidate) as f64;
+        prior_cost(search.effect(candidate)) + description
+    };
     let mut aliases: Vec<Alias> = Vec::new();
     for (candidate, gain) in near {
         let cosine = model.explained_by_signature(candidate, selected.candidate, &signature)?.sqrt();

@@ -9,15 +9,13 @@
 //! | a ball, the bar, an instrument that follows the position of an axis | 2 |
 //! | an error motion of an axis that follows the position of another axis | 2 |
 //! | a location error of one axis, such as a squareness, that follows the position of another axis | 4 |
-//! | a harmonic or a precession of order n, in addition | ln n |
 //!
 //! The bearing of an axis makes its error motions. That one axis moves another needs a load that shifts, or a guideway
-//! that bends; the squareness of two guideways has no mechanism that follows the angle of a table. There are many high
-//! orders, and each single one is unlikely.
+//! that bends; the squareness of two guideways has no mechanism that follows the angle of a table.
 
 use abbe_model::component::ErrorKind;
 use abbe_model::driver::Driver;
-use abbe_model::effect::{Component, Effect, Shape};
+use abbe_model::effect::{Component, Effect};
 
 /// The bearing of an axis moves, or the whole machine does.
 const OWN: f64 = 0.0;
@@ -28,15 +26,6 @@ const LOCATION_OF_OTHER: f64 = 4.0;
 
 /// The prior cost of an effect: `−ln` of its relative prior probability.
 pub(super) fn prior_cost(effect: &Effect) -> f64 {
-    let order = match &effect.shape {
-        Shape::Harmonic(harmonic) => harmonic.order,
-        Shape::Precession(precession) => precession.order,
-        _ => 1.0,
-    };
-    mechanism_cost(effect) + order.ln().max(0.0)
-}
-
-fn mechanism_cost(effect: &Effect) -> f64 {
     let Driver::Axis(driver) = &effect.driver else { return OWN };
     match &effect.component {
         Component::Axis(name) if name.axis == *driver => OWN,
@@ -48,20 +37,20 @@ fn mechanism_cost(effect: &Effect) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use abbe_model::effect::Shape;
     use abbe_model::effect::shape::Harmonic;
 
     use super::*;
 
     #[test]
     fn a_squareness_that_follows_another_axis_is_the_least_plausible() {
-        let of_order = |component: &str, driver: &str, order: f64| {
+        let cost = |component: &str, driver: &str| {
             let component = Component::parse(component).unwrap();
-            prior_cost(&Effect::new(component, Driver::parse(driver), Shape::Harmonic(Harmonic { order })))
+            let shape = Shape::Harmonic(Harmonic { order: 1.0 });
+            prior_cost(&Effect::new(component, Driver::parse(driver), shape))
         };
-        let cost = |component: &str, driver: &str| of_order(component, driver, 1.0);
         assert_eq!([cost("EZC", "C"), cost("EA0C", "C"), cost("EZC", "time")], [OWN; 3]);
         assert_eq!([cost("EZZ", "C"), cost("workpiece_ball.z", "C")], [OTHER; 2]);
         assert_eq!([cost("EA0Z", "C"), cost("EZ0A", "C")], [LOCATION_OF_OTHER; 2]);
-        assert_eq!(of_order("EZC", "C", 4.0), 4.0_f64.ln());
     }
 }

@@ -121,10 +121,11 @@ fn with_smooth_shapes(
     }
     let (found, steps, strongest) = (search.clone(), std::mem::take(&mut record.steps), record.strongest.clone());
     search.restart_without(&search.staircases());
-    search_on(search, record)?;
-    if found.objective_of_selected()? > search.objective_of_selected()? {
+    // An interruption keeps what was found.
+    let ended = search_on(search, record);
+    if ended.is_err() || found.objective_of_selected()? > search.objective_of_selected()? {
         (*search, record.steps, record.strongest) = (found, steps, strongest);
-        return Ok(None);
+        return ended.map(|_| None);
     }
     search_to_curves(search, record, judge).map(Some)
 }

@@ -163,6 +163,11 @@ fn commanded(machine: &Machine, state: &[AxisPosition<f64>]) -> Matrix3<f64> {
     Matrix3::from_columns(&[column(0), column(1), column(2)])
 }
 
+/// One channel has the opposite sign.
+const fn negated<const CHANNEL: usize>(columns: &'static str, words: &'static str) -> Misreading {
+    Misreading { columns, words, reread: |values| values[CHANNEL] = -values[CHANNEL] }
+}
+
 /// Quaternions are written with the scalar first or last, poses and rotations in either direction, and three angles by many
 /// conventions.
 const MISREADINGS: [Misreading; 15] = [
@@ -192,36 +197,12 @@ const MISREADINGS: [Misreading; 15] = [
         words: "the rotations are the inverse ones",
         reread: |values| values[OF_ROTATION].iter_mut().for_each(|value| *value = -*value),
     },
-    Misreading {
-        columns: "px",
-        words: "px has the opposite sign, and the rotations have not",
-        reread: |values| values[0] = -values[0],
-    },
-    Misreading {
-        columns: "py",
-        words: "py has the opposite sign, and the rotations have not",
-        reread: |values| values[1] = -values[1],
-    },
-    Misreading {
-        columns: "pz",
-        words: "pz has the opposite sign, and the rotations have not",
-        reread: |values| values[2] = -values[2],
-    },
-    Misreading {
-        columns: "rx",
-        words: "the component X of the rotation has the opposite sign",
-        reread: |values| values[3] = -values[3],
-    },
-    Misreading {
-        columns: "ry",
-        words: "the component Y of the rotation has the opposite sign",
-        reread: |values| values[4] = -values[4],
-    },
-    Misreading {
-        columns: "rz",
-        words: "the component Z of the rotation has the opposite sign",
-        reread: |values| values[5] = -values[5],
-    },
+    negated::<0>("px", "px has the opposite sign, and the rotations have not"),
+    negated::<1>("py", "py has the opposite sign, and the rotations have not"),
+    negated::<2>("pz", "pz has the opposite sign, and the rotations have not"),
+    negated::<3>("rx", "the component X of the rotation has the opposite sign"),
+    negated::<4>("ry", "the component Y of the rotation has the opposite sign"),
+    negated::<5>("rz", "the component Z of the rotation has the opposite sign"),
     Misreading {
         columns: "rx, ry, rz",
         words: "rx, ry, rz are roll, pitch and yaw about fixed axes X, Y, Z, not a rotation vector",

@@ -163,11 +163,16 @@ fn the_test_of_c_alone_separates_steps_of_c_from_steps_of_x() {
     let effects = vec![motion(Freedom::X, AxisName::C, jumps, 1.0)];
     let of = |tests| session(NestOn::Table, tests, errors_of(AxisName::C), effects.clone());
     traced(&of(vec![bk2()]), |outcome| {
-        let blames_x = |effect: &EffectResult| {
-            let mut all = std::iter::once(&effect.name).chain(effect.aliases.iter().map(|alias| &alias.name));
-            all.any(|name| name.component == "EXX" && name.shape == "steps")
-        };
-        assert!(outcome.result.effects.iter().any(blames_x), "BK2 alone blames X: {:?}", outcome.result.effects);
+        // Each is named beside the other, and neither is unique.
+        for (component, driver) in [("EXX", "X"), ("EXC", "C")] {
+            let blames = |effect: &EffectResult| {
+                let mut all = std::iter::once(&effect.name).chain(effect.aliases.iter().map(|alias| &alias.name));
+                let steps =
+                    all.any(|name| (&*name.component, &*name.driver, &*name.shape) == (component, driver, "steps"));
+                steps && !effect.unique
+            };
+            assert!(outcome.result.effects.iter().any(blames), "{component}: {:?}", outcome.result.effects);
+        }
     });
     traced(&of(vec![bk2(), c_alone()]), |outcome| {
         assert_eq!(outcome.result.verdict, TraceVerdict::Explained);

@@ -50,14 +50,17 @@ pub(super) const ENTRY: Entry = Entry {
     members: |sampled| members(sampled),
 };
 
-/// Along a run of one axis an instrument may read one direction alone, in which a precession is a harmonic: each then names
-/// the other as an alias.
+/// Cost along runs in addition to that of the order. An instrument may read one direction alone there, in which a precession
+/// is a harmonic; that two error motions have one amplitude is the less plausible cause.
+const COUPLED: f64 = 1.0;
+
 fn members(sampled: &Sampled) -> Vec<(Shape, f64)> {
     let resolved = if sampled.poses { HIGHEST_ORDER } else { Harmonic::resolved(sampled) };
     let most = if sampled.rotary { resolved.min(HIGHEST_ORDER) } else { 0 };
     let of_order = |order: usize| {
         let order = order as f64;
-        [false, true].map(|backward| (Shape::Precession(Precession { order, backward }), order.ln()))
+        let cost = order.ln() + if sampled.poses { 0.0 } else { COUPLED };
+        [false, true].map(|backward| (Shape::Precession(Precession { order, backward }), cost))
     };
     (1..=most).flat_map(of_order).collect()
 }
