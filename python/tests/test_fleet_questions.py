@@ -139,7 +139,7 @@ def frequent_sets(records):
         for record, effect in effects(records)
     ]
     found = most_frequent(rows)
-    assert found[0][1] == ("EZ0A~C:h2", "EZC~C:h2")
+    assert found[0][1] == ("EAC~C:precession-1", "EXC~C:precession-1", "EZ0A~C:h2", "EZC~C:h2")
     return [(code, list(names), machines, count) for code, names, machines, count in found]
 
 
