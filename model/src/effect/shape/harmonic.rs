@@ -37,11 +37,7 @@ pub(super) const ENTRY: Entry = Entry {
 
 /// The highest order that the sampling resolves.
 fn highest_order(sampled: &Sampled) -> usize {
-    if sampled.poses {
-        HIGHEST_ORDER_OF_POSES
-    } else {
-        Harmonic::resolved(sampled).min(HIGHEST_ORDER)
-    }
+    if sampled.poses { HIGHEST_ORDER_OF_POSES } else { Harmonic::resolved(sampled).min(HIGHEST_ORDER) }
 }
 
 impl Harmonic {
