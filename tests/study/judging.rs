@@ -29,7 +29,16 @@ pub fn is(name: &EffectName, truth: &Injected) -> bool {
     }
 }
 
-/// The found effect that is the truth or has it among its aliases. A period that divides a turn, within the resolution
+/// All that a found effect is called, with the shape numbers that are stated: its name, its variants, its aliases and theirs.
+fn explanations(effect: &EffectResult) -> impl Iterator<Item = (&EffectName, &[ShapeParameter])> {
+    let named = (&effect.name, effect.shape_parameters.as_slice(), &effect.variants);
+    let aliases = effect.aliases.iter().map(|own| (&own.name, own.shape_parameters.as_slice(), &own.variants));
+    std::iter::once(named)
+        .chain(aliases)
+        .flat_map(|(name, numbers, variants)| std::iter::once((name, numbers)).chain(variants.iter().map(|own| (own, &[][..]))))
+}
+
+/// The found effect that is the truth or has it among its aliases or their variants. A period that divides a turn, within the resolution
 /// of a turn, is that harmonic.
 pub fn found<'r>(outcome: &'r TracedSession, truth: &Injected) -> Option<&'r EffectResult> {
     let oracle = oracle(outcome.kind, outcome.noise);
@@ -42,7 +51,7 @@ pub fn found<'r>(outcome: &'r TracedSession, truth: &Injected) -> Option<&'r Eff
                     .is_some_and(|other| oracle.explained_share(truth, &other) > 0.99)
     };
     let effects = &outcome.result.effects;
-    effects.iter().find(|effect| is_truth(&effect.name) || effect.aliases.iter().any(|alias| is_truth(&alias.name)))
+    effects.iter().find(|effect| explanations(effect).any(|(name, _)| is_truth(name)))
 }
 
 /// The numbers with which the oracle judges a member of an alias set.
@@ -64,9 +73,7 @@ pub fn surplus_aliases(
     numbers: Numbers,
 ) -> Vec<EffectLabel> {
     let oracle = oracle(outcome.kind, outcome.noise);
-    let named_effect = (&effect.name, &effect.shape_parameters);
-    let mut surplus_aliases: Vec<EffectLabel> = std::iter::once(named_effect)
-        .chain(effect.aliases.iter().map(|alias| (&alias.name, &alias.shape_parameters)))
+    let mut surplus_aliases: Vec<EffectLabel> = explanations(effect)
         .filter(|(name, _)| !is(name, truth))
         .filter_map(|(name, own)| {
             let remounted = matches!(truth.shape, Shape::Remount { .. }) && !name.tests.is_empty();

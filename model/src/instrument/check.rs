@@ -21,8 +21,7 @@ pub(super) fn check_small(channels: &[Channel], checked: &Checked<'_>, skipped: 
     for (place, channel) in channels.iter().enumerate().skip(skipped) {
         let read = readings.observed.iter().skip(place).step_by(channels.len()).copied();
         let mut values: Vec<f64> = read.filter(|value| !value.is_nan()).collect();
-        let middle = median(&mut values);
-        let away = median(&mut values.iter().map(|value| (value - middle).abs()).collect::<Vec<_>>());
+        let away = scatter(&mut values);
         let (most, limit, shown) = match channel.is_angle() {
             true => (MAX_RAD, "2 mrad (412″)", format!("{:.1}″", away / ARCSECOND)),
             false => (MAX_MM, "5 mm", format!("{away:.3} mm")),
@@ -43,13 +42,18 @@ pub(super) fn check_small(channels: &[Channel], checked: &Checked<'_>, skipped: 
     Ok(())
 }
 
+/// The median absolute difference from the median.
+pub(super) fn scatter(values: &mut [f64]) -> f64 {
+    let middle = median(values);
+    median(&mut values.iter().map(|value| (value - middle).abs()).collect::<Vec<_>>())
+}
+
 /// Deviations that scatter by less are below what an interferometer or a ball bar resolves, mm.
 const MIN_SCATTER_MM: f64 = 5e-5;
 
 /// The doubt about deviations whose scatter no instrument resolves, as where a column in mm has a name in µm.
 pub(super) fn doubt_on_scatter(deviations: &mut [f64]) -> Option<String> {
-    let middle = median(deviations);
-    let scatter = median(&mut deviations.iter().map(|value| (value - middle).abs()).collect::<Vec<_>>());
+    let scatter = scatter(deviations);
     (scatter > 0.0 && scatter < MIN_SCATTER_MM).then(|| {
         format!(
             "the deviations scatter by {:.2} nm about their median, less than such an instrument resolves: is the column in \
@@ -57,4 +61,19 @@ pub(super) fn doubt_on_scatter(deviations: &mut [f64]) -> Option<String> {
             scatter * 1e6
         )
     })
+}
+
+/// Deviations of one axis that scatter by more are rare: a scale that is wrong by 1 mm per metre does so on four metres, mm.
+const MAX_SCATTER_MM: f64 = 1.0;
+
+/// The doubt about displacements whose scatter no axis has, as where a column in µm has a name in mm.
+pub(super) fn doubt_on_displacements(deviations: &mut [f64]) -> Option<String> {
+    let scatter = scatter(deviations);
+    if scatter <= MAX_SCATTER_MM {
+        return doubt_on_scatter(deviations);
+    }
+    Some(format!(
+        "the deviations scatter by {scatter:.2} mm about their median, more than those of an axis: is the column in µm, and \
+         its name in mm?"
+    ))
 }

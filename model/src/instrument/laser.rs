@@ -405,8 +405,7 @@ impl Instrument for Laser<f64> {
     fn check_readings(&self, checked: &Checked<'_>) -> Result<(), Fault> {
         let readings = checked.readings;
         if let Some(mut deviations) = self.displacements(checked.machine, readings) {
-            let from = median(&mut deviations);
-            let away = median(&mut deviations.iter().map(|value| (value - from).abs()).collect::<Vec<_>>());
+            let away = check::scatter(&mut deviations);
             if away > MAX_MM {
                 return Err((
                     format!(
@@ -423,7 +422,7 @@ impl Instrument for Laser<f64> {
         check::check_small(self.channels(), checked, skipped)
     }
     fn doubt(&self, checked: &Checked<'_>) -> Option<String> {
-        check::doubt_on_scatter(&mut self.displacements(checked.machine, checked.readings)?)
+        check::doubt_on_displacements(&mut self.displacements(checked.machine, checked.readings)?)
     }
     fn absent_channels_known(&self, priors: &mut [Prior]) {
         hold_absent(&places(&self.channels).collect::<Vec<_>>(), self.is_beam_stated, priors);
