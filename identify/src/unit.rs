@@ -65,6 +65,9 @@ impl ReadingUnit {
     }
 }
 
+/// Millimetres in a metre.
+const MM_PER_M: f64 = 1e3;
+
 /// Arcseconds per radian.
 pub const ARCSEC: f64 = 180.0 * 3600.0 / std::f64::consts::PI;
 
@@ -105,6 +108,7 @@ impl Unit {
     /// | lag | ms over an axis of the component's own kind; µm/(mm/s) or µm/(rad/s) over one of the other |
     /// | drift | µm/h |
     /// | polynomial, power over temperature or gravity at their scale of 1 K, 1 m | µm/K, µm/K², …; µm/m, µm/m², … |
+    /// | power 1 alone over a linear axis | µm/m |
     /// | every other | µm: the value where the basis function is 1, as at the scale of a polynomial |
     pub fn of_coefficient(
         component: InternalUnit,
@@ -131,8 +135,12 @@ impl Unit {
                 _ => per("(rad/s)"),
             },
             (Per::Hour, _) => per("h"),
+            (Per::Slope(scale), _) if matches!(driver, Driver::Axis(_)) && driver_axis == Some(AxisKind::Linear) => {
+                Unit { display_per_internal: MM_PER_M / scale * plain.display_per_internal, ..per("m") }
+            }
             (Per::Power(degree), Some(unit)) => per_power(unit, degree),
-            (Per::Power(_), None) | (Per::One, _) => plain,
+            (Per::Slope(1.0), Some(unit)) => per(unit),
+            (Per::Power(_) | Per::Slope(_) | Per::One, _) => plain,
         }
     }
 }
@@ -164,6 +172,14 @@ mod tests {
         assert_eq!(name(Millimetre, &axis("X"), linear, &cubic(100.0), 2), "um");
         // A polynomial over an axis with a scale of 1 mm has a value there, not a slope, as its coefficient.
         assert_eq!(name(Millimetre, &axis("X"), linear, &cubic(1.0), 1), "um");
+        // A slope over a linear axis is per length, whatever its scale.
+        let scale_error = Shape::Polynomial(Polynomial { degree: 1, scale: 100.0 });
+        assert_eq!(name(Millimetre, &axis("X"), linear, &scale_error, 0), "um/m");
+        let unit = Unit::of_coefficient(Millimetre, &axis("X"), linear, &scale_error, 0);
+        assert_eq!(unit.display_per_internal, 1e4);
+        assert_eq!(name(Radian, &axis("X"), linear, &scale_error, 0), "arcsec/m");
+        assert_eq!(name(Radian, &axis("X"), linear, &square(100.0), 0), "arcsec");
+        assert_eq!(name(Millimetre, &axis("C"), rotary, &scale_error, 0), "um");
         assert_eq!(name(Millimetre, &Driver::Time, None, &cubic(3600.0), 1), "um");
         assert_eq!(name(Millimetre, &Driver::Time, None, &Shape::Drift, 0), "um/h");
         assert_eq!(name(Ratio, &Driver::Time, None, &Shape::Drift, 0), "um/m/h");

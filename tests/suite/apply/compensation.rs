@@ -286,7 +286,7 @@ fn a_stationary_axis_has_no_table() {
     assert_eq!(run.status.code(), Some(1), "{printed}");
     assert!(
         printed.contains("no error can be compensated in this format")
-            && printed.contains("EXX~X:p1: its axis stands still wherever readings observe it"),
+            && printed.contains("EXX~X:power1: its axis stands still wherever readings observe it"),
         "{printed}"
     );
     assert!(!out.exists());

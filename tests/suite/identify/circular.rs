@@ -305,9 +305,9 @@ fn faults_that_are_effects_have_the_figures_of_a_fit() {
         let found = fit["parameters"].as_array().unwrap().iter().find(|parameter| parameter["id"] == id).unwrap();
         (um(found, "value"), um(found, "u"))
     };
-    // Powers count in 100 mm, the radius.
+    // A square counts in 100 mm, the radius.
     for (name, axes, id, effect, unit) in [
-        ("scale mismatch", "XY", "ratio", "EXX~X:power1", 10.0),
+        ("scale mismatch", "XY", "ratio", "EXX~X:power1", 1.0),
         ("squareness", "XY", "angle", "EC0Y", PI / 0.648),
         ("servo mismatch", "XY", "delay", "EXX~X:lag", 1.0),
         ("lateral play", "X", "play", "EYX~X:backlash", 1.0),

@@ -45,7 +45,7 @@ fn judged(plan: &Session) -> Vec<EffectDetectability> {
     effects(&problem).unwrap().effects
 }
 
-/// The detectable amplitude, µm, of an effect whose response at each position is `signal`: numerical least squares with
+/// The detectable amplitude, µm, or µm/m of a slope, of an effect whose response at each position is `signal`: numerical least squares with
 /// the bar length as the second parameter.
 fn closed_form(positions: impl Iterator<Item = f64>, signal: impl Fn(f64) -> [f64; 2]) -> f64 {
     let weight = 1.0 / NOISE_UM.powi(2);
@@ -60,11 +60,11 @@ fn closed_form(positions: impl Iterator<Item = f64>, signal: impl Fn(f64) -> [f6
     (NONCENTRALITY / (own - cross * cross / bar)).sqrt()
 }
 
-fn check(judged: &[EffectDetectability], id: &str, expected: f64) {
+fn check(judged: &[EffectDetectability], id: &str, expected: f64, unit: &str) {
     let found = judged.iter().find(|effect| effect.id == id).unwrap();
     let detectable = found.detectable_amplitude.unwrap();
-    println!("{id}: {detectable:.4} {}, closed form {expected:.4} um", found.unit);
-    assert_eq!(found.unit, "um", "{id}");
+    println!("{id}: {detectable:.4} {}, closed form {expected:.4} {unit}", found.unit);
+    assert_eq!(found.unit, unit, "{id}");
     assert!((detectable / expected - 1.0).abs() < 1e-3, "{id}: {detectable} for {expected}");
 }
 
@@ -76,21 +76,22 @@ fn a_power_of_a_rotary_axis_is_stated_at_half_a_turn() {
         for power in 1..=3 {
             let positions = (from..=to).map(f64::from);
             let expected = closed_form(positions, |q| [(q / 180.0).powi(power), 1.0]);
-            check(&judged, &format!("EZC~C:power{power}"), expected);
+            check(&judged, &format!("EZC~C:power{power}"), expected, "um");
         }
     }
 }
 
 #[test]
-fn a_power_of_a_linear_axis_is_stated_at_100_mm() {
+fn a_power_of_a_linear_axis_is_stated_at_100_mm_and_a_slope_per_metre() {
     for (from, to) in [(-20, 20), (-5, 25)] {
         let plan = upright(&format!("axis = \"X\", from_mm = {from}, to_mm = {to}, step_mm = 0.5"));
         let judged = judged(&plan);
         for power in 1..=3 {
             let positions = (2 * from..=2 * to).map(|half| 0.5 * f64::from(half));
             // The bar is inclined: the reading is the cosine of the displacement along Z.
-            let signal = |x: f64| [(x / 100.0).powi(power) * 100.0 / x.hypot(100.0), 1.0];
-            check(&judged, &format!("EZX~X:power{power}"), closed_form(positions, signal));
+            let (scale_mm, unit) = if power == 1 { (1000.0, "um/m") } else { (100.0, "um") };
+            let signal = |x: f64| [(x / scale_mm).powi(power) * 100.0 / x.hypot(100.0), 1.0];
+            check(&judged, &format!("EZX~X:power{power}"), closed_form(positions, signal), unit);
         }
     }
 }

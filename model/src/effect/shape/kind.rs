@@ -79,7 +79,7 @@ impl Follows {
 }
 
 /// The dimension of a coefficient: that of the component over this.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Per {
     /// 1: the coefficient is the value of the component where the basis function is 1.
     One,
@@ -89,6 +89,8 @@ pub enum Per {
     Hour,
     /// The driver to this power, in its internal unit.
     Power(usize),
+    /// The driver over this scale, alone: over a linear axis a coefficient per length, such as a scale error.
+    Slope(f64),
 }
 
 /// Everything that is particular to one shape, except its basis functions: see [`Basis`].

@@ -71,8 +71,9 @@ impl ShapeKind for Polynomial {
     fn describe(&self, words: &EffectWords) -> String {
         format!("{}, a polynomial of degree {} in {}", words.motion, self.degree, words.driver)
     }
+    /// A polynomial of degree 1 is the power 1, and has its name.
     fn tag(&self) -> String {
-        format!("p{}", self.degree)
+        if self.degree == 1 { "power1".into() } else { format!("p{}", self.degree) }
     }
     fn order(&self) -> Option<f64> {
         Some(self.degree as f64)
@@ -81,7 +82,11 @@ impl ShapeKind for Polynomial {
         self.degree
     }
     fn per(&self, k: usize) -> Per {
-        if self.scale == 1.0 { Per::Power(k + 1) } else { Per::One }
+        match (self.degree, self.scale) {
+            (1, scale) => Per::Slope(scale),
+            (_, 1.0) => Per::Power(k + 1),
+            _ => Per::One,
+        }
     }
 }
 

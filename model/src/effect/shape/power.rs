@@ -65,7 +65,11 @@ impl ShapeKind for Power {
         Some(self.degree as f64)
     }
     fn per(&self, _: usize) -> Per {
-        if self.scale == 1.0 { Per::Power(self.degree) } else { Per::One }
+        match (self.degree, self.scale) {
+            (1, scale) => Per::Slope(scale),
+            (degree, 1.0) => Per::Power(degree),
+            _ => Per::One,
+        }
     }
 }
 

@@ -109,7 +109,7 @@ fn the_ready_session_of_diagonals_is_that_of_the_plant() {
         assert_data("diagonals", &format!("{name}.csv"), &machine.data(ends, false, 5, 1e-4, &mut random));
     }
     let mut truth: Vec<(&'static str, f64)> = SQUARENESS.iter().copied().zip(arcsec).collect();
-    truth.extend([("EXX~X:p1", 3.6), ("EYY~Y:p1", -0.8), ("EZZ~Z:p1", 6.0), ("EXX~X:backlash", -1.2)]);
+    truth.extend([("EXX~X:power1", 12.0), ("EYY~Y:power1", -8.0), ("EZZ~Z:power1", 20.0), ("EXX~X:backlash", -1.2)]);
     assert_found("diagonals", "session.toml", &truth);
 }
 

@@ -176,7 +176,7 @@ fn readings_at_large_errors_are_those_of_the_plant() {
 
             // Azimuth and elevation of the line of sight, from true to columns and back to channels.
             let directions = [[0.6, 0.0, 0.8], [0.0, -1.0, 0.0], [-0.8, 0.0, 0.6]];
-            let pointing = Station::Pointing(Pointing { directions });
+            let pointing = Station::Pointing(Pointing { directions, is_free: true });
             let [sight, across, up] = directions.map(Vector3::from);
             let actual = plant.tool[1].turn * (sight + across * unknowns[0] + up * unknowns[1]);
             let mut columns = [(-actual.y).atan2(actual.x), actual.z.atan2(actual.x.hypot(actual.y))];
@@ -450,7 +450,7 @@ fn a_bar_a_laser_and_a_level_in_one_session() {
     let of_laser = "[[test]]\nname = \"laser\"\nkind = \"laser\"\ndata = \"laser.csv\"\nbeam = [1, 0, 0]\n";
     let of_level =
         "[[test]]\nname = \"level\"\nkind = \"angle\"\ndata = \"level.csv\"\nabout = [0, 1, 0]\nbody = \"tool\"\n";
-    let truth = [("EB0Z", squareness_arcsec), ("EXX~X:p1", 6.0), ("EBX~X:p1", 8.0)];
+    let truth = [("EB0Z", squareness_arcsec), ("EXX~X:power1", 20.0), ("EBX~X:power1", 8.0 / 0.3)];
     let u = |session: &Session| -> Vec<f64> {
         let (problem, found) = prepare(session, 1).unwrap();
         let parameters = fit::parameters(&problem, &found);
