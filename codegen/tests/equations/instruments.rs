@@ -60,7 +60,7 @@ impl Source for Any {
             Any::Distance => {
                 Distance { station: point(table), reflector: point(tool), frame: StationFrame::Table }.into()
             }
-            Any::Pointing => Pointing { directions }.into(),
+            Any::Pointing => Pointing { directions, is_free: true }.into(),
             Any::Polar => Tracker { target: point(tool), stand: stand(), is_polar: true }.into(),
             Any::Pose => Pose { target: point(tool), stand: stand(), turn: None }.into(),
         })

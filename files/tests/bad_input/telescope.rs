@@ -104,10 +104,17 @@ fn a_mount_that_turns_the_other_way_is_refused() {
     assert_contains(&text, &["away from what was observed", "direction = [0, 0, -1]"]);
 }
 
-/// The readings agree with the line of sight along X, whatever the session states.
+/// The readings agree with the line of sight along X, whatever the session states: found if it has no prior, named if it has.
 #[test]
-fn a_line_of_sight_that_fits_is_named() {
-    let elsewhere = |text: &str| text.replace("name = \"N\"", "name = \"N\"\nline_of_sight = [0.6, 0, -0.8]");
-    let text = error_text(read("a.dat", TPOINT, elsewhere));
-    assert_contains(&text, &["points 53.", "agree with one line of sight", "`line_of_sight = [1.0000, "]);
+fn a_line_of_sight_that_fits_is_found_or_named() {
+    let elsewhere = |more: &'static str| {
+        move |text: &str| text.replace("name = \"N\"", &format!("name = \"N\"\nline_of_sight = [0.6, 0, -0.8]{more}"))
+    };
+    let warnings = read("a.dat", TPOINT, elsewhere("")).unwrap().warnings.join(" ");
+    assert_contains(
+        &warnings,
+        &["points 53.", "agree with one line of sight", "`line_of_sight = [1.000000, 0.000000, 0.000000]`"],
+    );
+    let text = error_text(read("a.dat", TPOINT, elsewhere("\nline_of_sight_u_arcsec = 30")));
+    assert_contains(&text, &["points 53.", "all readings agree with `line_of_sight = [1.000000, 0.000000, 0.000000]`"]);
 }

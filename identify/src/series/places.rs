@@ -43,7 +43,7 @@ pub fn sightings(problem: &Problem, series: &SessionSeries) -> Option<Vec<Sighti
         let columns = test.readings.as_deref()?;
         for (row, (before, after)) in pairs(&readings.before_um).zip(pairs(&readings.after_um)).enumerate() {
             columns.state(machine, row, &mut state);
-            let [x, y, z] = test.station.sight(machine, &state)?;
+            let [x, y, z] = problem.models[number].station().sight(machine, &state)?;
             if (0..2).all(|channel| problem.counts(number, 2 * row + channel)) {
                 found.push(Sighting {
                     azimuth_deg: (-y).atan2(x).to_degrees().rem_euclid(360.0),

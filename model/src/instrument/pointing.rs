@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::bearing::{Sight, bearings, direction, observed_bearings};
 use super::channel::Channel;
 use super::column::{Column, Quantity};
-use super::kind::Checked;
+use super::kind::{Checked, Group};
 use super::set_up::{self, SetUp, Written};
 use super::{Aligned, Travel, 
     Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
@@ -26,6 +26,7 @@ use crate::quantity::ARCSECOND;
 use crate::frames::{Point, cross, dot};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
+use crate::session::readings::Readings;
 use crate::session::expression::Constant;
 
 /// The direction of the line of sight: across and up.
@@ -65,18 +66,21 @@ struct Keys {
 fn read(set_up: &Node, _: &[Constant]) -> Result<SetUp, KeyFault> {
     let keys: Keys = set_up::keys(set_up)?;
     let sight = Point(keys.line_of_sight.map_or([1.0, 0.0, 0.0], |sight| sight.0));
-    // Across is horizontal; of a vertical line of sight it is −Y, as of one to the north.
-    let horizontal = cross(sight.0, Point([0.0, 0.0, 1.0]));
-    let length = horizontal.norm();
-    let across = if length > 1e-6 { Point(horizontal.0.map(|x| x / length)) } else { Point([0.0, -1.0, 0.0]) };
-    let up = cross(across.0, sight);
-    let written = |direction: Point<f64>| direction.0.map(Written::number);
+    let is_free = keys.line_of_sight_u_arcsec.is_none_or(|u| set_up::angle(u) == Prior::Free);
     let priors = match keys.line_of_sight_u_arcsec {
         None => vec![Prior::Free, Prior::Known],
         Some(u) => vec![set_up::angle(u); 2],
     };
-    let directions = [written(sight), written(across), written(up)];
-    Ok(SetUp::new(Station::Pointing(Pointing { directions }), priors))
+    let directions = about(sight).map(|direction| direction.0.map(Written::number));
+    Ok(SetUp::new(Station::Pointing(Pointing { directions, is_free }), priors))
+}
+
+/// A line of sight with across and up. Across is horizontal; of a vertical line of sight it is −Y, as of one to the north.
+fn about(sight: Point<f64>) -> [Point<f64>; 3] {
+    let horizontal = cross(sight.0, Point([0.0, 0.0, 1.0]));
+    let length = horizontal.norm();
+    let across = if length > 1e-6 { Point(horizontal.0.map(|x| x / length)) } else { Point([0.0, -1.0, 0.0]) };
+    [sight, across, cross(across.0, sight)]
 }
 
 /// A line of sight as mounted.
@@ -84,6 +88,8 @@ fn read(set_up: &Node, _: &[Constant]) -> Result<SetUp, KeyFault> {
 pub struct Pointing<N> {
     /// Line of sight, across and up in the tool frame, of unit length.
     pub directions: [[N; 3]; 3],
+    /// Whether the line of sight has no prior, so that it is found where the stated one is far from all readings.
+    pub is_free: bool,
 }
 
 impl<N: Nominal> Pointing<N> {
@@ -100,6 +106,7 @@ impl<N> Geometry<N> for Pointing<N> {
     fn map<M>(&self, to: &impl Fn(&N) -> M) -> Pointing<M> {
         Pointing {
             directions: self.directions.each_ref().map(|direction| point(direction, to)),
+            is_free: self.is_free,
         }
     }
     /// Across and up, rad.
@@ -174,51 +181,85 @@ impl Instrument for Pointing<f64> {
         let help = "pointing needs true_azimuth_deg and true_elevation_deg";
         Some((format!("`{}`", column.name(column.unit)), help.into()))
     }
-    /// The mount points near what was observed.
+    /// The mount points near what was observed, or one line of sight agrees with all of it.
     fn check_readings(&self, checked: &Checked<'_>) -> Result<(), Fault> {
-        let readings = checked.readings;
-        let mut state = Vec::new();
-        let mut away = Vec::with_capacity(readings.rows());
-        let mut in_tool = Vec::with_capacity(readings.rows());
-        for (row, values) in readings.observed.chunks_exact(CHANNELS.len()).enumerate() {
-            readings.state(checked.machine, row, &mut state);
-            let (seen, nominal) = (observed(values[0], values[1]), self.nominal::<f64>(checked.machine, &state));
-            away.push(angle_deg(seen, nominal[0]));
-            let parts = nominal.iter().zip(&self.directions).map(|(now, tool)| Point(tool.map(|x| x * dot(seen, *now))));
-            in_tool.push(parts.fold(Point([0.0; 3]), |sum, part| sum.plus(part)));
-        }
-        let typical = median(&mut away);
-        if typical <= MAX_AWAY_DEG {
+        let seen = self.seen(checked.machine, checked.readings);
+        let away_deg = self.away_deg(&seen);
+        if away_deg <= MAX_AWAY_DEG || self.is_free && common_sight(&seen).is_some() {
             return Ok(());
         }
         Err((
             format!(
-                "test \"{}\": the mount nominally points {typical:.1}° away from what was observed (median of {} \
+                "test \"{}\": the mount nominally points {away_deg:.1}° away from what was observed (median of {} \
                  readings); the limit is {MAX_AWAY_DEG}°",
                 checked.test,
-                readings.rows()
+                seen.len()
             ),
-            line_of_sight(&in_tool).unwrap_or_else(|| {
-                "check the directions of the axes (a mount that turns through east as R is defined has `direction = [0, 0, \
-                 -1]` for azimuth and `[0, -1, 0]` for elevation), `line_of_sight`, and the units of the columns"
-                    .into()
-            }),
+            common_sight(&seen).map_or_else(
+                || {
+                    "check the directions of the axes (a mount that turns through east as R is defined has `direction = [0, \
+                     0, -1]` for azimuth and `[0, -1, 0]` for elevation), `line_of_sight`, and the units of the columns"
+                        .into()
+                },
+                |(sight, _)| format!("all readings agree with `line_of_sight = {}` in the tool frame", shown(sight)),
+            ),
         ))
+    }
+    fn doubt(&self, checked: &Checked<'_>) -> Option<String> {
+        let seen = self.seen(checked.machine, checked.readings);
+        let away_deg = self.away_deg(&seen);
+        let (sight, scatter_deg) = common_sight(&seen).filter(|_| away_deg > MAX_AWAY_DEG)?;
+        Some(format!(
+            "the mount nominally points {away_deg:.1}° away from what was observed, and all readings but for \
+             {scatter_deg:.2}° (median) agree with one line of sight in the tool frame, from which estimates count: state \
+             `line_of_sight = {}`",
+            shown(sight)
+        ))
+    }
+    /// A line of sight without prior that is far from all readings is found from them, to a degree, so that sessions of one
+    /// mount count from the same one.
+    fn mounted(&self, group: &Group<'_>) -> Option<Station<f64>> {
+        let seen: Vec<Point<f64>> =
+            group.tests.iter().flat_map(|(_, readings)| self.seen(group.machine, readings)).collect();
+        let is_found = self.is_free && !seen.is_empty() && self.away_deg(&seen) > MAX_AWAY_DEG;
+        let (sight, _) = common_sight(&seen).filter(|_| is_found)?;
+        Some(Station::Pointing(Pointing { directions: about(sight).map(|direction| direction.0), ..self.clone() }))
     }
 }
 
-/// What to do if one line of sight fits all that was observed, given in the tool frame.
-fn line_of_sight(in_tool: &[Point<f64>]) -> Option<String> {
-    let sum = in_tool.iter().fold(Point([0.0; 3]), |sum, seen| sum.plus(*seen));
-    let mean = Point(sum.0.map(|x| x / sum.norm()));
-    let [x, y, z] = mean.0;
-    let scatter = median(&mut in_tool.iter().map(|seen| angle_deg(*seen, mean)).collect::<Vec<_>>());
-    (scatter <= MAX_SCATTER_DEG).then(|| {
-        format!(
-            "all readings but for {scatter:.2}° (median) agree with one line of sight in the tool frame: state `line_of_sight = \
-             [{x:.4}, {y:.4}, {z:.4}]` if the axes are as drawn"
-        )
-    })
+impl Pointing<f64> {
+    /// What was observed at each reading, in the tool frame.
+    fn seen(&self, machine: &Machine, readings: &Readings) -> Vec<Point<f64>> {
+        let mut state = Vec::new();
+        let in_tool = |(row, values): (usize, &[f64])| {
+            readings.state(machine, row, &mut state);
+            let (seen, nominal) = (observed(values[0], values[1]), self.nominal::<f64>(machine, &state));
+            let parts = nominal.iter().zip(&self.directions).map(|(now, tool)| Point(tool.map(|x| x * dot(seen, *now))));
+            parts.fold(Point([0.0; 3]), |sum, part| sum.plus(part))
+        };
+        readings.observed.chunks_exact(CHANNELS.len()).enumerate().map(in_tool).collect()
+    }
+    /// The median angle between the line of sight and what was observed, deg.
+    fn away_deg(&self, seen: &[Point<f64>]) -> f64 {
+        median(&mut seen.iter().map(|seen| angle_deg(*seen, Point(self.directions[0]))).collect::<Vec<_>>())
+    }
+}
+
+/// The line of sight in the tool frame that agrees with all that was observed, in whole degrees, and the median angle to it,
+/// deg. `None` if they do not agree.
+fn common_sight(seen: &[Point<f64>]) -> Option<(Point<f64>, f64)> {
+    let [x, y, z] = seen.iter().fold(Point([0.0; 3]), |sum, seen| sum.plus(*seen)).0;
+    let [across, up] = [y.atan2(x), z.atan2(x.hypot(y))].map(|angle| angle.to_degrees().round().to_radians());
+    let sight = Point([up.cos() * across.cos(), up.cos() * across.sin(), up.sin()]);
+    let scatter_deg = median(&mut seen.iter().map(|seen| angle_deg(*seen, sight)).collect::<Vec<_>>());
+    (scatter_deg <= MAX_SCATTER_DEG).then_some((sight, scatter_deg))
+}
+
+/// A direction as a session states it.
+fn shown(direction: Point<f64>) -> String {
+    let [x, y, z] = direction.0;
+    // Adding zero leaves no negative zero.
+    format!("[{:.6}, {:.6}, {:.6}]", x + 0.0, y + 0.0, z + 0.0)
 }
 
 /// The angle between two directions of unit length, deg.

@@ -78,7 +78,7 @@ fn every_station(table: [f64; 3], tool: [f64; 3]) -> [Station<f64>; 13] {
         angle(Body::Table),
         distance(StationFrame::Table),
         distance(StationFrame::Bed),
-        Station::Pointing(Pointing { directions }),
+        Station::Pointing(Pointing { directions, is_free: true }),
     ]
 }
 

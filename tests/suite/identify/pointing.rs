@@ -161,6 +161,37 @@ fn large_errors_of_a_mount_are_those_of_rotation_matrices() {
     }
 }
 
+/// A line of sight without prior is found wherever it is stated, the opposite direction included.
+#[test]
+fn a_line_of_sight_is_found_from_any_start() {
+    let errors = [4e-3, -3e-3, 2e-3, 1e-3, -2.5e-3, 1.2e-3];
+    let star = |at: [f64; 2]| {
+        let [azimuth, elevation] = observed(at, errors);
+        [at[0], at[1], azimuth, elevation]
+    };
+    let stars: Vec<[f64; 4]> = positions().into_iter().map(star).collect();
+    let folder = tempfile::tempdir().unwrap();
+    simulated(folder.path(), &stars, "noise_arcsec = 0.1\n");
+    let file = folder.path().join("session.toml");
+    let stated = fs::read_to_string(&file).unwrap();
+    for (sight, is_found) in [("1, 0, 0", false), ("0.8, 0.6, 0", true), ("0, 0, 1", true), ("-1, 0, 0", true)] {
+        fs::write(&file, format!("{stated}line_of_sight = [{sight}]\n")).unwrap();
+        let session = files::session(&file, &ReadOptions::default()).unwrap();
+        let said = session.warnings.join(" ");
+        assert_eq!(
+            said.contains("state `line_of_sight = [1.000000, 0.000000, 0.000000]`"),
+            is_found,
+            "{sight}: {said}"
+        );
+        let (problem, fit) = prepare(&session, 1).unwrap();
+        let truth = ["EA0AZ", "EB0AZ", "EC0AZ", "EA0EL", "EB0EL", "line_of_sight.across"].into_iter().zip(errors);
+        for (id, value) in truth {
+            let place = problem.parameters.list.iter().position(|parameter| parameter.id.starts_with(id)).unwrap();
+            assert!((fit.beta[place] - value).abs() < 1e-10, "{sight}, {id}: {} instead of {value}", fit.beta[place]);
+        }
+    }
+}
+
 /// A tube that bends by 20″ cos E, and by 15″ cot E: the line of sight points lower than the encoder says, and the terms are
 /// positive.
 #[test]
