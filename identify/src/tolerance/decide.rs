@@ -31,10 +31,11 @@ pub fn conformity(
             };
             let forbidden = match limit.of {
                 Toleranced::Parameter(_) => goodness.forbids_decisions(),
-                // A figure of a test follows from its readings without the model, but not without their unit.
-                Toleranced::Figure { .. } => {
-                    goodness.forbids_decisions().filter(|_| goodness.not_judged == Some(NotJudged::WrongUnit))
-                }
+                // A figure of a test follows from its readings without the model, but not without their unit, which is in
+                // doubt where they scatter less than the instrument.
+                Toleranced::Figure { .. } => goodness
+                    .forbids_decisions()
+                    .filter(|_| matches!(goodness.not_judged, Some(NotJudged::WrongUnit | NotJudged::BelowNoise))),
             };
             item(limit, *probability, measured, forbidden)
         })

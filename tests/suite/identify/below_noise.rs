@@ -93,8 +93,8 @@ fn deviations_in_mm_under_um_pass_nothing() {
     assert!(!run.status.success() && !out.exists() && said.contains("less than a tenth of the noise"), "{said}");
 }
 
-/// A noise that is stated three times too large is no other unit: the estimates may be quoted, nothing about a parameter is
-/// decided, and figures that need no model are. One that is stated by a tenth too large agrees.
+/// A noise that is stated three times too large is no other unit: the estimates may be quoted, and nothing is decided. One that
+/// is stated by a tenth too large agrees.
 #[test]
 fn a_noise_that_is_stated_too_large_is_not_judged() {
     let folder = tempfile::tempdir().unwrap();
@@ -104,8 +104,14 @@ fn a_noise_that_is_stated_too_large_is_not_judged() {
     assert_eq!(found["statements"]["good"]["goodness"]["quotable"], true);
     let items = found["conformity"]["items"].as_array().unwrap();
     let decisions: Vec<&str> = items.iter().map(|item| item["decision"].as_str().unwrap()).collect();
-    assert_eq!(decisions, ["undecided", "undecided", "pass"]);
+    assert_eq!(decisions, ["undecided"; 3]);
     assert!(found["conflicts"].as_array().is_none_or(Vec::is_empty), "{}", found["conflicts"]);
+    let certificate = folder.path().join("certificate.toml");
+    fs::write(&certificate, abbe::certificate::EXAMPLE).unwrap();
+    let out = folder.path().join("certificate.xml");
+    let run = abbe(&["fit", text(&file), "--dcc", text(&out)]);
+    let said = String::from_utf8_lossy(&run.stderr);
+    assert!(!run.status.success() && !out.exists() && said.contains("far below the noise"), "{said}");
     let agrees = tempfile::tempdir().unwrap();
     let file = written(agrees.path(), &drawn(0.27));
     let (found, screen) = result("fit", &file, &[]);
