@@ -2,10 +2,12 @@
 
 use abbe::document::StatedTrace;
 use abbe::identify::IdentifyError;
+use abbe::identify::noise::NoiseSource;
 use abbe::identify::results::{
     EffectResult, GoodnessVerdict, ModelResult, NextStep, NotJudged, PriorResult, TraceResult, TraceVerdict,
 };
 use abbe::identify::series::{spectrum, views};
+use abbe::model::session::Session;
 use abbe::model::words::counted;
 use abbe::trace::TraceOutcome;
 
@@ -51,7 +53,7 @@ pub fn report(
         format!(
             "{}, {}; {} of {} detectable.",
             counted(result.readings, "reading"),
-            noise(result),
+            noise(result, &problem.session),
             result.candidates_detectable,
             counted(result.candidates, "candidate")
         )
@@ -245,11 +247,19 @@ fn next(result: &TraceResult, measure: NextStep, commands: &Commands) -> Vec<(St
     steps
 }
 
-/// The noise and its source in words. A residual is not called noise.
-fn noise(result: &TraceResult) -> String {
+/// The noise and its source in words. A residual is not called noise. Repeats that contradict a stated noise take its place in
+/// a trace, and not in a fit.
+fn noise(result: &TraceResult, session: &Session) -> String {
     if result.noise_source.judges() || result.effects.is_empty() {
         let along_runs = quality::autocorrelated(&result.noise_ar_coefficients);
-        return quality::noise(result.noise_um, result.reading_unit, result.noise_source) + along_runs;
+        let stated_um = session.stated_noise_mm().map(|mm| mm * 1e3).filter(|_| result.reading_unit.is_micrometre());
+        let in_place_of = match (result.noise_source, stated_um) {
+            (NoiseSource::Repeats, Some(um)) => {
+                format!(" in place of the stated {}", of_readings(um, result.reading_unit))
+            }
+            _ => String::new(),
+        };
+        return quality::noise(result.noise_um, result.reading_unit, result.noise_source) + &in_place_of + along_runs;
     }
     format!(
         "residual of the declared model {}, with the effects {} (no noise stated, no repeats)",

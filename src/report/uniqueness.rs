@@ -91,17 +91,20 @@ pub fn also(variants: &[EffectName]) -> String {
     }
 }
 
-/// How equal an alias is: `Δχ² 1.3, likelihood ratio 0.52`.
+/// How equal an alias is: `Δχ² 1.3, likelihood ratio 0.52, probability ratio 0.19`. The probability also counts what the
+/// effect costs to describe and how plausible it is mechanically.
 pub fn likelihood(alias: &AliasResult) -> String {
-    let ratio = alias.likelihood_ratio;
-    let ratio = if (0.01..1000.0).contains(&ratio) { format!("{ratio:.2}") } else { with_exponent(ratio, 0) };
+    let shown = |ratio: f64| match (0.01..1000.0).contains(&ratio) {
+        true => format!("{ratio:.2}"),
+        false => with_exponent(ratio, 0),
+    };
     // A difference of rounding is none.
     let delta = if alias.delta_chi2.abs() < 0.05 { 0.0 } else { alias.delta_chi2 };
-    let less_plausible = match alias.prior_cost > 0.0 {
-        true => format!(", mechanically less plausible: probability ratio {:.2}", alias.probability_ratio),
-        false => String::new(),
+    let probability = match alias.prior_cost == 0.0 {
+        true => String::new(),
+        false => format!(", probability ratio {}", shown(alias.probability_ratio)),
     };
-    format!("Δχ² {delta:.1}, likelihood ratio {ratio}{less_plausible}").replace('-', "−")
+    format!("Δχ² {delta:.1}, likelihood ratio {}{probability}", shown(alias.likelihood_ratio)).replace('-', "−")
 }
 
 /// The first explanations and the number of the others. A part of the machine is named once where it repeats.
