@@ -63,14 +63,14 @@ pub type HistoryStatements = Statements<HistoryStatement, ChangedInHistory>;
 /// Are these machines in control, what to correct, what to measure next.
 pub fn statements(machines: &[MachineHistory]) -> HistoryStatements {
     let out = machines.iter().filter(|machine| !machine.out_of_control.is_empty() || machine.validation.is_some());
-    let changed = |machine: &MachineHistory| -> Vec<ChangedInHistory> {
+    let changed = |machine: &MachineHistory, is_intended: bool| -> Vec<ChangedInHistory> {
         let shifts = machine.changes.iter().filter(|change| match change.kind {
-            Kind::Shift | Kind::CompensationAndShift => true,
-            Kind::Compensation | Kind::Correction => false,
+            Kind::Shift | Kind::CompensationAndShift => !is_intended,
+            Kind::Compensation | Kind::Correction => is_intended,
         });
         let shifted: BTreeSet<&String> = shifts.flat_map(|change| &change.parameters).collect();
         let own = machine.parameters.iter();
-        let own = own.filter(|one| one.drift_per_year.is_some() || shifted.contains(&one.id));
+        let own = own.filter(|one| one.drift_per_year.is_some() && !is_intended || shifted.contains(&one.id));
         own.map(|one| ChangedInHistory {
             machine_id: machine.machine_id.clone(),
             id: one.id.clone(),
@@ -90,8 +90,9 @@ pub fn statements(machines: &[MachineHistory]) -> HistoryStatements {
             machines: machines.len(),
             out_of_control: out.map(|machine| machine.machine_id.clone()).collect(),
         },
-        correct: machines.iter().flat_map(changed).collect(),
-        changed: Vec::new(),
+        correct: machines.iter().flat_map(|machine| changed(machine, false)).collect(),
+        // Steps that a correction or a known compensation explains.
+        changed: machines.iter().flat_map(|machine| changed(machine, true)).collect(),
         further: Vec::new(),
         measure: step.into(),
     }

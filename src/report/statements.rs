@@ -7,7 +7,7 @@ use abbe::apply::compare::ComparisonStatement;
 use abbe::apply::compare::results::{Comparison, Difference};
 use abbe::codegen::nc::has_letters;
 #[cfg(feature = "fleet")]
-use abbe::fleet::history::HistoryStatements;
+use abbe::fleet::history::{ChangedInHistory, HistoryStatements};
 use abbe::identify::results::validation::{MovedParameter, ValidationResult, ValidationVerdict};
 use abbe::identify::results::{
     AxisCorrection, DeterminedBy, GoodStatement, LineQuantity, MeasureStatement, NextStep, NotJudged, ParameterResult,
@@ -365,12 +365,14 @@ pub fn of_history(
 ) -> Vec<String> {
     let out = &statements.good.out_of_control;
     let control = match out.len() {
-        0 if statements.correct.is_empty() => "No machine is out of control".to_string(),
+        0 if statements.correct.is_empty() && statements.changed.is_empty() => {
+            "No machine is out of control".to_string()
+        }
         0 => "Within the limits of the control charts since the last change".to_string(),
         _ => format!("Out of control: {}", first_of(out, NAMED, ", ", "further machine")),
     };
     let several = statements.good.machines > 1;
-    let changed = statements.correct.iter().map(|changed| {
+    let in_words = |changed: &ChangedInHistory| {
         let of = if several { format!(" of {}", changed.machine_id) } else { String::new() };
         let drift = changed
             .drift_per_year
@@ -379,10 +381,14 @@ pub fn of_history(
             changed.shift.map(|shift| format!("has shifted by {}", estimate(shift.value, shift.u, &changed.unit)));
         let how = drift.into_iter().chain(shift).collect::<Vec<_>>().join(" and ");
         format!("{}{of} {how}", changed.id)
-    });
-    let correct = match statements.correct.is_empty() {
-        true => "nothing; no parameter drifts or has shifted".to_string(),
-        false => first_of(&changed.collect::<Vec<_>>(), NAMED, ", ", "further parameter"),
+    };
+    let listed = |list: &[ChangedInHistory]| {
+        first_of(&list.iter().map(in_words).collect::<Vec<_>>(), NAMED, ", ", "further parameter")
+    };
+    let correct = match (statements.correct.is_empty(), statements.changed.is_empty()) {
+        (true, true) => "nothing; no parameter drifts or has shifted".to_string(),
+        (true, false) => format!("nothing; {}, as by a correction", listed(&statements.changed)),
+        (false, _) => listed(&statements.correct),
     };
     let next = match check {
         Some((machine, when)) => format!("{machine}, whose next check is due {when}"),

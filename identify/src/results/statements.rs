@@ -156,9 +156,10 @@ pub struct Statements<G = GoodStatement, C = AxisCorrection> {
     /// Is the result good.
     pub good: G,
     /// What to correct: of a fit and a trace the line of each axis whose location errors are identified, of a plan what of
-    /// the set-up limits its worst error, of a history what has changed; of a comparison and a validation nothing.
+    /// the set-up limits its worst error, of a history what drifts or has shifted; of a comparison and a validation nothing.
     pub correct: Vec<C>,
-    /// Of a comparison and a validation: what has changed. A change is no error that remains.
+    /// Of a comparison and a validation: what has changed. A change is no error that remains. Of a history: steps that a
+    /// correction or a known compensation explains.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub changed: Vec<C>,
     /// Of a fit and a trace: what else exceeds its expanded uncertainty and is no set-up parameter, the most significant

@@ -162,6 +162,16 @@ fn a_step_of_a_short_series_is_found_and_named() {
     assert_eq!(steps.len(), 1, "{squareness:#}");
     assert!((steps[0]["value"].as_f64().unwrap().abs() - 20.0).abs() < 1.0, "{squareness:#}");
     assert!(squareness["u_enlargement"].as_f64().unwrap() < 3.0, "{squareness:#}");
+    // The screen states its amount with its uncertainty, and nothing that contradicts it.
+    let screen = place.shell("abbe fleet history results");
+    let screen = String::from_utf8_lossy(&screen.stdout).to_string();
+    let stated = screen.lines().find(|line| line.contains("EC0Y has shifted by"));
+    let amount =
+        stated.and_then(|line| line.split("EC0Y has shifted by ").nth(1)?.split(" ± ").next()?.parse::<f64>().ok());
+    assert!((amount.unwrap_or(f64::NAN).abs() - 20.0).abs() < 1.0, "{screen}");
+    for false_beside_a_step in ["No machine is out of control", "no parameter drifts or has shifted"] {
+        assert!(!screen.contains(false_beside_a_step), "{screen}");
+    }
     // A step before the last session: there is no later one to start the charts again.
     let last = sessions_with_a_step(7, 6);
     run(&last, "--no-trace");
