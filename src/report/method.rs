@@ -152,3 +152,31 @@ fn centres(result: &Comparison) -> Table {
         ["test", "centre", ">offset, µm", ">u", ">radius, mm", ">cone height, mm", "first-order shares, in µm and ″"];
     Table::new(columns, rows).titled("Offset of each axis at the fixed ball from its nominal position")
 }
+
+#[cfg(test)]
+mod tests {
+    use abbe::identify::noise::NoiseSource;
+
+    use super::*;
+
+    /// A residual that grows is no reduction.
+    #[test]
+    fn only_a_smaller_residual_is_reduced() {
+        let said = |nominal_rms_um: f64, method_rms_um: f64| {
+            change(&Comparison {
+                method: "circle".to_string(),
+                readings: 100,
+                noise_um: 0.3,
+                noise_source: NoiseSource::Stated,
+                rms_um: 0.3,
+                method_rms_um,
+                nominal_rms_um,
+                centres: Vec::new(),
+                errors: Vec::new(),
+                warnings: Vec::new(),
+            })
+        };
+        assert!(said(18.7, 36.3).starts_with("does not reduce the rms residual of its tests: 18.7 µm"));
+        assert_eq!(said(36.3, 18.7), "reduces the rms residual of its tests from 36.3 µm to 18.7 µm");
+    }
+}

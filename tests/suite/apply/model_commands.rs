@@ -261,6 +261,55 @@ fn entries_of_a_control_state_what_remains() {
     refused(&far, "a position in mm or degrees");
 }
 
+/// A file that holds a fixed geometry alone states what it leaves out and what that leaves, as the screen and JSON do. The
+/// entries that are written leave no more than the plain location errors.
+#[test]
+fn a_fixed_geometry_states_what_the_effects_leave() {
+    let folder = folder();
+    let bundled = ready("hermle-c600u/measured/session.toml");
+    for entry in std::fs::read_dir(bundled.parent().unwrap()).unwrap() {
+        let path = entry.unwrap().path();
+        std::fs::copy(&path, folder.path().join(path.file_name().unwrap())).unwrap();
+    }
+    let session = folder.path().join("session.toml");
+    let effect = "\n[[effect]]\ncomponent = \"EYA\"\ndriver = \"A\"\nshape = \"harmonic\"\norder = 2\n";
+    let declared = std::fs::read_to_string(&session).unwrap() + effect;
+    std::fs::write(&session, declared).unwrap();
+    let [model, out, json] = ["model.json", "machine.urdf", "export.json"].map(|name| folder.path().join(name));
+    success(&abbe(&["fit", text(&session), "--save", text(&model), "--quiet"]));
+    let printed = success(&abbe(&["export", text(&model), "--as", "urdf", "--out", text(&out), "--json", text(&json)]));
+    let result: Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
+    let rms = |which: &str| result["remaining"][which]["rms_um"].as_f64().unwrap();
+    assert!(0.0 < rms("written") && rms("written") < rms("plain") && rms("plain") < rms("without"), "{result:#}");
+    let file = std::fs::read_to_string(&out).unwrap();
+    for said in [&file, &printed] {
+        assert!(said.contains("left out: EYA~A:h2"), "{said}");
+        assert!(said.contains(&format!("{:.1} um rms over the range of its readings", rms("without"))), "{said}");
+        assert!(said.contains("which leave least without the effects"), "{said}");
+    }
+}
+
+/// The summary of corrected commands covers every row, those too that could not be corrected, and states its tool point.
+#[test]
+fn a_summary_covers_all_rows() {
+    let folder = folder();
+    let model = model(folder.path());
+    let [commands, out] = ["commands.csv", "corrected.csv"].map(|name| folder.path().join(name));
+    std::fs::write(&commands, "x_mm,y_mm,z_mm,a_deg,c_deg\n10,20,-10,30,40\n0,0,0,0,0\n-50,60,0,-10,200\n").unwrap();
+    let printed =
+        success(&abbe(&["compensate", text(&model), text(&commands), "--out", text(&out), "--tool-mm", "0,0,-120"]));
+    let (header, found) = rows(&out);
+    let column = |name: &str| header.iter().position(|own| own == name).unwrap();
+    // Where A is at zero its axis is no longer apart from that of the tool, and the direction cannot be corrected.
+    let states: Vec<&str> = found.iter().map(|row| row[column("state")].as_str()).collect();
+    assert_eq!(states, ["corrected", "position-only", "corrected"]);
+    let largest = |name: &str| found.iter().map(|row| row[column(name)].parse::<f64>().unwrap()).fold(0.0, f64::max);
+    assert!(largest("remaining_arcsec") > 0.1, "{found:?}");
+    assert!(printed.contains("Tool point [0.000, 0.000, -120.000] mm in the tool frame."), "{printed}");
+    let line = printed.lines().find(|line| line.contains("largest remaining error of all rows")).unwrap();
+    assert!(line.contains(&format!("{:.3}″", largest("remaining_arcsec"))), "{line}");
+}
+
 /// MuJoCo reads the exported chain and moves the tool as the model does.
 #[test]
 fn mujoco_reads_the_exported_urdf() {

@@ -83,6 +83,49 @@ fn instruments_that_read_at_rest_have_a_stop_at_each_target() {
     }
 }
 
+/// A plan of a ball bar, a level and a laser: each program has the word of its own instrument, and the two that read at rest
+/// have a stop at each target, in the words of every control.
+#[test]
+fn a_plan_of_several_instruments_has_the_program_of_each() {
+    let place = tempfile::tempdir().unwrap();
+    let machine = "chain = \"w b X Y Z t\"\n[axis.X]\ntravel_mm = [-400, 400]\n[axis.Y]\ntravel_mm = [-400, 400]\n[axis.Z]\n\
+                   travel_mm = [-400, 400]\n";
+    let sweep =
+        "sweep = { axis = \"X\", from_mm = -200, to_mm = 200, step_mm = 40, runs = 3, both_directions = true }\n";
+    let plan = format!(
+        "[machine]\nfile = \"machine.toml\"\n[instrument]\nkind = \"ballbar\"\n[unknowns]\nerrors = [\"EC0Y\"]\n\
+         [[test]]\nname = \"XY\"\nbar_mm = 100\nworkpiece_ball_mm = [0, 0, 0]\nspindle_ball_mm = [0, 0, 0]\n\
+         path = {{ kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 2 }}\n\
+         [[test]]\nname = \"LV\"\nkind = \"angle\"\nabout = [0, 1, 0]\nbody = \"tool\"\n{sweep}\
+         [[test]]\nname = \"LX\"\nkind = \"laser\"\nbeam = [1, 0, 0]\nchannels = [\"displacement\"]\n{sweep}"
+    );
+    std::fs::write(place.path().join("machine.toml"), machine).unwrap();
+    std::fs::write(place.path().join("plan.toml"), plan).unwrap();
+    for (control, dwell) in
+        [("siemens", "G4 F4"), ("heidenhain", "DWELL 4"), ("fanuc", "G4 X4.000"), ("linuxcnc", "G4 P4")]
+    {
+        let out = place.path().join(control);
+        let session = place.path().join("plan.toml");
+        let run = abbe(&["nc", text(&session), "--control", control, "--out", text(&out), "--dwell-s", "4", "--quiet"]);
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        let programs: Vec<String> = std::fs::read_dir(&out)
+            .unwrap()
+            .map(|file| std::fs::read_to_string(file.unwrap().path()).unwrap().to_uppercase())
+            .collect();
+        // Eleven targets, there and back, three times.
+        for (test, instrument, stops) in [("XY", "ballbar", 0), ("LV", "angle", 66), ("LX", "laser", 66)] {
+            let named = format!("TEST {test}, {}", instrument.to_uppercase());
+            let own: Vec<&String> = programs.iter().filter(|program| program.contains(&named)).collect();
+            let [program] = own[..] else { panic!("{control}: {} programs say `{named}`", own.len()) };
+            let measured = program.split("MEASURED PATH BEGINS").skip(1);
+            let measured = measured.map(|path| path.split("MEASURED PATH ENDS").next().unwrap_or(path));
+            let found: usize = measured.map(|path| path.matches(dwell).count()).sum();
+            assert_eq!(found, stops, "{control}, {test}: {program}");
+            assert_eq!(program.contains("BALL"), instrument == "ballbar", "{control}, {test}: {program}");
+        }
+    }
+}
+
 /// What the programs only remark, the terminal says too: an overshoot that the travel cuts short, a ball that no axis
 /// reaches, a start without room above it.
 #[test]
