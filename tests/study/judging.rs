@@ -33,9 +33,9 @@ pub fn is(name: &EffectName, truth: &Injected) -> bool {
 fn explanations(effect: &EffectResult) -> impl Iterator<Item = (&EffectName, &[ShapeParameter])> {
     let named = (&effect.name, effect.shape_parameters.as_slice(), &effect.variants);
     let aliases = effect.aliases.iter().map(|own| (&own.name, own.shape_parameters.as_slice(), &own.variants));
-    std::iter::once(named)
-        .chain(aliases)
-        .flat_map(|(name, numbers, variants)| std::iter::once((name, numbers)).chain(variants.iter().map(|own| (own, &[][..]))))
+    std::iter::once(named).chain(aliases).flat_map(|(name, numbers, variants)| {
+        std::iter::once((name, numbers)).chain(variants.iter().map(|own| (own, &[][..])))
+    })
 }
 
 /// The found effect that is the truth or has it among its aliases or their variants. A period that divides a turn, within the resolution
