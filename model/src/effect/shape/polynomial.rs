@@ -1,6 +1,7 @@
 //! `polynomial`: the powers 1 to n of the driver over a scale: (q/s), …, (q/s)ⁿ.
 
 use super::kind::{Basis, Entry, Follows, Per, ShapeFault, ShapeKind, positive};
+use super::power::Power;
 use super::words::EffectWords;
 use super::{DriverSample, Key, KeyForm, KeyReader, KeyWriter, Shape};
 use crate::document::Fault;
@@ -69,7 +70,10 @@ impl ShapeKind for Polynomial {
         check(self.degree, self.scale)
     }
     fn describe(&self, words: &EffectWords) -> String {
-        format!("{}, a polynomial of degree {} in {}", words.motion, self.degree, words.driver)
+        match self.degree {
+            1 => Power { degree: 1, scale: self.scale }.describe(words),
+            degree => format!("{}, a polynomial of degree {degree} in {}", words.motion, words.driver),
+        }
     }
     /// A polynomial of degree 1 is the power 1, and has its name.
     fn tag(&self) -> String {
