@@ -176,7 +176,7 @@ mod tests {
                 warnings: Vec::new(),
             })
         };
-        assert!(said(18.7, 36.3).starts_with("does not reduce the rms residual of its tests: 18.7 µm"));
-        assert_eq!(said(36.3, 18.7), "reduces the rms residual of its tests from 36.3 µm to 18.7 µm");
+        assert!(said(18.7, 36.3).starts_with("does not reduce the rms residual of its tests: 18.700 µm"));
+        assert_eq!(said(36.3, 18.7), "reduces the rms residual of its tests from 36.300 µm to 18.700 µm");
     }
 }

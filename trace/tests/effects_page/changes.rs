@@ -64,7 +64,13 @@ pub fn changes(mut session: Session, effects: &[Effect]) -> Changes {
         let mut found = Vec::new();
         for (place, parameter) in list.iter().enumerate() {
             if wanted(parameter.role) {
-                let unit = if parameter.id.starts_with("gain") { 1e3 } else { 1.0 };
+                // Slopes over a linear axis count at 100 mm, as other powers do.
+                let is_slope = parameter.unit.name.ends_with("/m") && !parameter.id.contains("gravity");
+                let unit = match (parameter.id.starts_with("gain"), is_slope) {
+                    (true, _) => 1e3,
+                    (false, true) => 10.0,
+                    (false, false) => 1.0,
+                };
                 beta[place] = STEP * unit / parameter.unit.display_per_internal;
                 let with = read(&beta);
                 beta[place] = 0.0;
