@@ -253,8 +253,8 @@ pub struct EffectDetectability {
     pub family: String,
     /// Unit of its amplitude.
     pub unit: String,
-    /// Smallest amplitude that a test of this effect alone detects, in `unit`; of a power at 100 mm or 180°, the first over
-    /// a linear axis per metre. `null` where no amplitude of physical size is detectable.
+    /// Smallest amplitude that a test of this effect alone detects, in `unit`; of power 1 over a linear axis per metre, of
+    /// other powers at 100 mm or 180°. `null` where no amplitude of physical size is detectable.
     pub detectable_amplitude: Option<f64>,
     /// Smallest amplitude that is detected when all effects are screened, in `unit`.
     pub detectable_amplitude_screened: Option<f64>,

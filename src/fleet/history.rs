@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
-use abbe_apply::history::events::{Compensation, Kind};
+use abbe_apply::history::events::{ChangeEvent, Compensation, Kind};
 use abbe_apply::history::faults::{Fault, FoundEffect, faults};
-use abbe_apply::history::results::{Estimate, History, MachineHistory};
+use abbe_apply::history::results::{Estimate, History, MachineHistory, ParameterHistory};
 use abbe_apply::history::{HistoryOptions, MachineSessions, SessionValues, analyse};
 use abbe_identify::results::validation::ValidationVerdict;
 use abbe_identify::results::{NextStep, Statements};
@@ -40,7 +40,7 @@ pub struct HistoryStatement {
     pub out_of_control: Vec<String>,
 }
 
-/// A parameter of a machine that drifts, or that has shifted other than by a compensation or towards zero.
+/// A parameter of a machine that drifts or has shifted.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ChangedInHistory {
     /// Identifier of the machine.
@@ -50,7 +50,7 @@ pub struct ChangedInHistory {
     /// Its drift, in `unit` a year; absent if it has shifted only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drift_per_year: Option<Estimate>,
-    /// Its last step, in `unit`; absent if it drifts only.
+    /// Its last such step, in `unit`; absent if it drifts only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shift: Option<Estimate>,
     /// Unit of the parameter.
@@ -63,26 +63,32 @@ pub type HistoryStatements = Statements<HistoryStatement, ChangedInHistory>;
 /// Are these machines in control, what to correct, what to measure next.
 pub fn statements(machines: &[MachineHistory]) -> HistoryStatements {
     let out = machines.iter().filter(|machine| !machine.out_of_control.is_empty() || machine.validation.is_some());
-    let changed = |machine: &MachineHistory, is_intended: bool| -> Vec<ChangedInHistory> {
-        let shifts = machine.changes.iter().filter(|change| match change.kind {
-            Kind::Shift | Kind::CompensationAndShift => !is_intended,
-            Kind::Compensation | Kind::Correction => is_intended,
-        });
-        let shifted: BTreeSet<&String> = shifts.flat_map(|change| &change.parameters).collect();
-        let own = machine.parameters.iter();
-        let own = own.filter(|one| one.drift_per_year.is_some() && !is_intended || shifted.contains(&one.id));
-        own.map(|one| ChangedInHistory {
+    let changed = |machine: &MachineHistory, is_explained: bool| -> Vec<ChangedInHistory> {
+        let is_wanted = |change: &ChangeEvent| match change.kind {
+            Kind::Shift | Kind::CompensationAndShift => !is_explained,
+            Kind::Compensation | Kind::Correction => is_explained,
+        };
+        // The last step of this kind: that of the series of the parameter, if no other one follows.
+        let shift_of = |one: &ParameterHistory| -> Option<Estimate> {
+            let own = machine.changes.iter().filter(|change| change.parameters.contains(&one.id));
+            let own: Vec<&ChangeEvent> = own.collect();
+            let last = own.iter().rposition(|change| is_wanted(change))?;
+            match last + 1 == own.len() {
+                true => one.steps.last().map(|step| Estimate { value: step.value, u: step.u }),
+                false => {
+                    let change = own[last].changes.iter().find(|change| change.id == one.id)?;
+                    Some(Estimate { value: change.value, u: change.u })
+                }
+            }
+        };
+        let own = machine.parameters.iter().map(|one| ChangedInHistory {
             machine_id: machine.machine_id.clone(),
             id: one.id.clone(),
-            drift_per_year: one.drift_per_year,
-            shift: one
-                .steps
-                .last()
-                .filter(|_| shifted.contains(&one.id))
-                .map(|step| Estimate { value: step.value, u: step.u }),
+            drift_per_year: one.drift_per_year.filter(|_| !is_explained),
+            shift: shift_of(one),
             unit: one.unit.clone(),
-        })
-        .collect()
+        });
+        own.filter(|one| one.drift_per_year.is_some() || one.shift.is_some()).collect()
     };
     let step = if machines.is_empty() { NextStep::Nothing } else { NextStep::NextCheck };
     Statements {
@@ -91,7 +97,7 @@ pub fn statements(machines: &[MachineHistory]) -> HistoryStatements {
             out_of_control: out.map(|machine| machine.machine_id.clone()).collect(),
         },
         correct: machines.iter().flat_map(|machine| changed(machine, false)).collect(),
-        // Steps that a correction or a known compensation explains.
+        // Steps that a known compensation or a way to zero explains.
         changed: machines.iter().flat_map(|machine| changed(machine, true)).collect(),
         further: Vec::new(),
         measure: step.into(),

@@ -387,7 +387,9 @@ pub fn of_history(
     };
     let correct = match (statements.correct.is_empty(), statements.changed.is_empty()) {
         (true, true) => "nothing; no parameter drifts or has shifted".to_string(),
-        (true, false) => format!("nothing; {}, as by a correction", listed(&statements.changed)),
+        (true, false) => {
+            format!("nothing. Explained by a compensation or an adjustment: {}", listed(&statements.changed))
+        }
         (false, _) => listed(&statements.correct),
     };
     let next = match check {

@@ -159,7 +159,7 @@ pub struct Statements<G = GoodStatement, C = AxisCorrection> {
     /// the set-up limits its worst error, of a history what drifts or has shifted; of a comparison and a validation nothing.
     pub correct: Vec<C>,
     /// Of a comparison and a validation: what has changed. A change is no error that remains. Of a history: steps that a
-    /// correction or a known compensation explains.
+    /// known compensation or a way to zero explains.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub changed: Vec<C>,
     /// Of a fit and a trace: what else exceeds its expanded uncertainty and is no set-up parameter, the most significant

@@ -162,6 +162,12 @@ fn a_step_of_a_short_series_is_found_and_named() {
     assert_eq!(steps.len(), 1, "{squareness:#}");
     assert!((steps[0]["value"].as_f64().unwrap().abs() - 20.0).abs() < 1.0, "{squareness:#}");
     assert!(squareness["u_enlargement"].as_f64().unwrap() < 3.0, "{squareness:#}");
+    // It leads to zero, as an adjustment does: it has changed, and is not to correct.
+    let statements = &found["statements"];
+    let changed = &statements["changed"][0];
+    assert!(statements["correct"].as_array().unwrap().is_empty() && changed["id"] == "EC0Y", "{statements:#}");
+    assert!((changed["shift"]["value"].as_f64().unwrap().abs() - 20.0).abs() < 1.0, "{statements:#}");
+    assert!(changed["drift_per_year"].is_null(), "{statements:#}");
     // The screen states its amount with its uncertainty, and nothing that contradicts it.
     let screen = place.shell("abbe fleet history results");
     let screen = String::from_utf8_lossy(&screen.stdout).to_string();
