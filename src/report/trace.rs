@@ -247,19 +247,17 @@ fn next(result: &TraceResult, measure: NextStep, commands: &Commands) -> Vec<(St
     steps
 }
 
-/// The noise and its source in words. A residual is not called noise. Repeats that contradict a stated noise take its place in
-/// a trace, and not in a fit.
+/// The noise and its source in words. A residual is not called noise. Many repeats, or a few that contradict it, take the place
+/// of a stated noise in a trace, and not in a fit.
 fn noise(result: &TraceResult, session: &Session) -> String {
     if result.noise_source.judges() || result.effects.is_empty() {
-        let along_runs = quality::autocorrelated(&result.noise_ar_coefficients);
         let stated_um = session.stated_noise_mm().map(|mm| mm * 1e3).filter(|_| result.reading_unit.is_micrometre());
-        let in_place_of = match (result.noise_source, stated_um) {
-            (NoiseSource::Repeats, Some(um)) => {
-                format!(" in place of the stated {}", of_readings(um, result.reading_unit))
-            }
+        let along_runs = quality::autocorrelated(&result.noise_ar_coefficients);
+        let stated = match (result.noise_source, stated_um) {
+            (NoiseSource::Repeats, Some(um)) => format!("; stated {}", of_readings(um, result.reading_unit)),
             _ => String::new(),
         };
-        return quality::noise(result.noise_um, result.reading_unit, result.noise_source) + &in_place_of + along_runs;
+        return quality::noise(result.noise_um, result.reading_unit, result.noise_source) + along_runs + &stated;
     }
     format!(
         "residual of the declared model {}, with the effects {} (no noise stated, no repeats)",

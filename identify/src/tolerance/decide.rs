@@ -29,13 +29,17 @@ pub fn conformity(
                     figures::measured(session, circular, test, *figure, noise_um, *instrument_u_um)
                 }
             };
+            let below_noise =
+                "the residual is far below the noise: the unit of the readings is in doubt; check units and noise";
             let forbidden = match limit.of {
                 Toleranced::Parameter(_) => goodness.forbids_decisions(),
                 // A figure of a test follows from its readings without the model, but not without their unit, which is in
                 // doubt where they scatter less than the instrument.
-                Toleranced::Figure { .. } => goodness
-                    .forbids_decisions()
-                    .filter(|_| matches!(goodness.not_judged, Some(NotJudged::WrongUnit | NotJudged::BelowNoise))),
+                Toleranced::Figure { .. } => match goodness.not_judged {
+                    Some(NotJudged::WrongUnit) => goodness.forbids_decisions(),
+                    Some(NotJudged::BelowNoise) => Some(below_noise),
+                    _ => None,
+                },
             };
             item(limit, *probability, measured, forbidden)
         })

@@ -73,7 +73,7 @@ pub(super) fn doubt_on_displacements(deviations: &mut [f64]) -> Option<String> {
         return doubt_on_scatter(deviations);
     }
     Some(format!(
-        "the deviations scatter by {scatter:.2} mm about their median, more than those of an axis: is the column in µm, and \
-         its name in mm?"
+        "the displacement differs from the travel by {scatter:.2} mm (median, about its own median), which is rare for an axis: \
+         is the column in µm, and its name in mm?"
     ))
 }

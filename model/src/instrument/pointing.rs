@@ -201,7 +201,10 @@ impl Instrument for Pointing<f64> {
                      0, -1]` for azimuth and `[0, -1, 0]` for elevation), `line_of_sight`, and the units of the columns"
                         .into()
                 },
-                |(sight, _)| format!("all readings agree with `line_of_sight = {}` in the tool frame", shown(sight)),
+                |(sight, _)| {
+                    let sight = shown(sight);
+                    format!("most readings agree with `line_of_sight = {sight}`: state it, or leave out `line_of_sight_u_arcsec`")
+                },
             ),
         ))
     }
@@ -210,9 +213,9 @@ impl Instrument for Pointing<f64> {
         let away_deg = self.away_deg(&seen);
         let (sight, scatter_deg) = common_sight(&seen).filter(|_| away_deg > MAX_AWAY_DEG)?;
         Some(format!(
-            "the mount nominally points {away_deg:.1}° away from what was observed, and all readings but for \
-             {scatter_deg:.2}° (median) agree with one line of sight in the tool frame, from which estimates count: state \
-             `line_of_sight = {}`",
+            "the mount nominally points {away_deg:.1}° away from what was observed (median). The readings lie {scatter_deg:.2}° \
+             (median) from another line of sight, from which the fit starts: state `line_of_sight = {}`, in whole degrees, or \
+             correct the zeros of the axes",
             shown(sight)
         ))
     }

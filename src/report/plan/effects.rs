@@ -39,7 +39,8 @@ pub fn detectable(found: &EffectsAnalysis) -> Table {
     table(found.effects.iter().filter(|effect| effect.verdict == Detectability::Detectable)).titled(format!(
         "Detectable: smallest amplitude that is found with {:.0} % power at {:.0} % significance by a single test of that effect and by a search of\n\
          the library of {} effects (Šidák, conservative); share of the signal that remains in the residual; bias of the errors while it is\n\
-         undeclared; number of further effects of the same component and driver. A power has its amplitude at 100 mm, or at 180°",
+         undeclared; number of further effects of the same component and driver. A power has its amplitude at 100 mm\n\
+         or at 180°, power 1 of a linear axis per metre",
         found.power * 100.0,
         found.significance_level * 100.0,
         found.effects_screened
