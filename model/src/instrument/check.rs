@@ -21,7 +21,7 @@ pub(super) fn check_small(channels: &[Channel], checked: &Checked<'_>, skipped: 
     for (place, channel) in channels.iter().enumerate().skip(skipped) {
         let read = readings.observed.iter().skip(place).step_by(channels.len()).copied();
         let mut values: Vec<f64> = read.filter(|value| !value.is_nan()).collect();
-        let away = scatter(&mut values);
+        let away = median_absolute_deviation(&mut values);
         let (most, limit, shown) = match channel.is_angle() {
             true => (MAX_RAD, "2 mrad (412″)", format!("{:.1}″", away / ARCSECOND)),
             false => (MAX_MM, "5 mm", format!("{away:.3} mm")),
@@ -42,8 +42,8 @@ pub(super) fn check_small(channels: &[Channel], checked: &Checked<'_>, skipped: 
     Ok(())
 }
 
-/// The median absolute difference from the median.
-pub(super) fn scatter(values: &mut [f64]) -> f64 {
+/// The median absolute deviation from the median.
+pub(super) fn median_absolute_deviation(values: &mut [f64]) -> f64 {
     let middle = median(values);
     median(&mut values.iter().map(|value| (value - middle).abs()).collect::<Vec<_>>())
 }
@@ -53,7 +53,7 @@ const MIN_SCATTER_MM: f64 = 5e-5;
 
 /// The doubt about deviations whose scatter no instrument resolves, as where a column in mm has a name in µm.
 pub(super) fn doubt_on_scatter(deviations: &mut [f64]) -> Option<String> {
-    let scatter = scatter(deviations);
+    let scatter = median_absolute_deviation(deviations);
     (scatter > 0.0 && scatter < MIN_SCATTER_MM).then(|| {
         format!(
             "the deviations scatter by {:.2} nm about their median, less than such an instrument resolves: is the column in \
@@ -68,7 +68,7 @@ const MAX_SCATTER_MM: f64 = 1.0;
 
 /// The doubt about displacements whose scatter no axis has, as where a column in µm has a name in mm.
 pub(super) fn doubt_on_displacements(deviations: &mut [f64]) -> Option<String> {
-    let scatter = scatter(deviations);
+    let scatter = median_absolute_deviation(deviations);
     if scatter <= MAX_SCATTER_MM {
         return doubt_on_scatter(deviations);
     }

@@ -405,7 +405,7 @@ impl Instrument for Laser<f64> {
     fn check_readings(&self, checked: &Checked<'_>) -> Result<(), Fault> {
         let readings = checked.readings;
         if let Some(mut deviations) = self.displacements(checked.machine, readings) {
-            let away = check::scatter(&mut deviations);
+            let away = check::median_absolute_deviation(&mut deviations);
             if away > MAX_MM {
                 return Err((
                     format!(

@@ -1,7 +1,6 @@
 //! `polynomial`: the powers 1 to n of the driver over a scale: (q/s), …, (q/s)ⁿ.
 
 use super::kind::{Basis, Entry, Follows, Per, ShapeFault, ShapeKind, positive};
-use super::power::Power;
 use super::words::EffectWords;
 use super::{DriverSample, Key, KeyForm, KeyReader, KeyWriter, Shape};
 use crate::document::Fault;
@@ -59,6 +58,15 @@ pub(super) fn check(degree: usize, scale: f64) -> Result<(), ShapeFault> {
     positive(scale, "the scale of a polynomial")
 }
 
+/// The dimension of the coefficient of a power of the driver over a scale, in a shape of this degree.
+pub(super) fn per(degree: usize, scale: f64, power: usize) -> Per {
+    match (degree, scale) {
+        (1, scale) => Per::Slope(scale),
+        (_, 1.0) => Per::Power(power),
+        _ => Per::One,
+    }
+}
+
 impl ShapeKind for Polynomial {
     fn entry(&self) -> &'static Entry {
         &ENTRY
@@ -71,7 +79,7 @@ impl ShapeKind for Polynomial {
     }
     fn describe(&self, words: &EffectWords) -> String {
         match self.degree {
-            1 => Power { degree: 1, scale: self.scale }.describe(words),
+            1 => words.in_proportion(),
             degree => format!("{}, a polynomial of degree {degree} in {}", words.motion, words.driver),
         }
     }
@@ -86,11 +94,7 @@ impl ShapeKind for Polynomial {
         self.degree
     }
     fn per(&self, k: usize) -> Per {
-        match (self.degree, self.scale) {
-            (1, scale) => Per::Slope(scale),
-            (_, 1.0) => Per::Power(k + 1),
-            _ => Per::One,
-        }
+        per(self.degree, self.scale, k + 1)
     }
 }
 

@@ -47,12 +47,11 @@ impl ShapeKind for Power {
     }
     fn describe(&self, words: &EffectWords) -> String {
         let EffectWords { motion, driver, .. } = words;
-        match (self.degree, &words.proportional) {
-            (1, Some(proportional)) => format!("{motion}{proportional}"),
-            (1, None) => format!("{motion} in proportion to {driver}"),
-            (2, _) => format!("{motion} with the square of {driver}"),
-            (3, _) => format!("{motion} with the cube of {driver}"),
-            (degree, _) => format!("{motion} with {driver} to the power of {degree}"),
+        match self.degree {
+            1 => words.in_proportion(),
+            2 => format!("{motion} with the square of {driver}"),
+            3 => format!("{motion} with the cube of {driver}"),
+            degree => format!("{motion} with {driver} to the power of {degree}"),
         }
     }
     fn word(&self) -> &'static str {
@@ -65,11 +64,7 @@ impl ShapeKind for Power {
         Some(self.degree as f64)
     }
     fn per(&self, _: usize) -> Per {
-        match (self.degree, self.scale) {
-            (1, scale) => Per::Slope(scale),
-            (degree, 1.0) => Per::Power(degree),
-            _ => Per::One,
-        }
+        polynomial::per(self.degree, self.scale, self.degree)
     }
 }
 

@@ -20,6 +20,13 @@ pub struct EffectWords {
 }
 
 impl EffectWords {
+    /// The motion in proportion to the driver.
+    pub fn in_proportion(&self) -> String {
+        match &self.proportional {
+            Some(proportional) => format!("{}{proportional}", self.motion),
+            None => format!("{} in proportion to {}", self.motion, self.driver),
+        }
+    }
     /// A position, period or width of the driver, with its unit.
     pub fn at_value(&self, value: f64) -> String {
         format!("{}{}", four_digits(self.unit.to_display(value)), self.unit.symbol)
