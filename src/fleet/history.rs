@@ -434,6 +434,41 @@ mod tests {
         assert!(longest_increasing(&[]).is_empty());
     }
 
+    /// A correction by 30 and a shift by 20 after it: each is stated with its own amount, whichever is the later.
+    #[test]
+    fn a_step_is_stated_where_its_event_belongs() {
+        for (levels, corrected, shifted) in [([30.0, 0.0, 20.0], -30.0, 20.0), ([10.0, 30.0, 0.0], -30.0, 20.0)] {
+            let session = |k: usize| {
+                // Deviations of known size in place of noise.
+                let value = levels[k / 10] + [0.4, -0.7, 0.1, 0.9, -0.5, -0.2, 0.6][k % 7];
+                let days = 30.0 * k as f64;
+                SessionValues {
+                    days,
+                    until_days: days,
+                    file: format!("{k}"),
+                    values: vec![Some((value, 0.6))],
+                    covariance: vec![vec![0.36]],
+                }
+            };
+            let machine = MachineSessions {
+                machine_id: "M".into(),
+                parameters: vec![("EX0C".into(), "um".into(), String::new())],
+                determined: 1,
+                sessions: (0..30).map(session).collect(),
+                ..MachineSessions::default()
+            };
+            let history = analyse(&[machine], &HistoryOptions::default());
+            let stated = statements(&history.machines);
+            let amounts = |list: &[ChangedInHistory]| -> Vec<f64> {
+                list.iter().map(|own| own.shift.map_or(f64::NAN, |shift| shift.value)).collect()
+            };
+            let [explained, others] = [amounts(&stated.changed), amounts(&stated.correct)];
+            assert!(explained.len() == 1 && (explained[0] - corrected).abs() < 1.0, "{levels:?}: {stated:?}");
+            assert!(others.len() == 1 && (others[0] - shifted).abs() < 1.0, "{levels:?}: {stated:?}");
+            assert!(stated.changed[0].drift_per_year.is_none());
+        }
+    }
+
     #[test]
     fn set_up_parameters_and_phases_have_no_history() {
         for (id, is) in [("EX0C", true), ("bar[A100]", false), ("EZC~C:h2.amplitude", true), ("EZC~C:h2.phase", false)]
