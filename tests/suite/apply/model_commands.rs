@@ -20,6 +20,19 @@ fn model(folder: &Path) -> PathBuf {
     path
 }
 
+/// A copy of the bundled measured session that declares more.
+fn bundled_with(folder: &Path, more: &str) -> PathBuf {
+    let bundled = ready("hermle-c600u/measured/session.toml");
+    for entry in std::fs::read_dir(bundled.parent().unwrap()).unwrap() {
+        let path = entry.unwrap().path();
+        std::fs::copy(&path, folder.join(path.file_name().unwrap())).unwrap();
+    }
+    let session = folder.join("session.toml");
+    let declared = std::fs::read_to_string(&session).unwrap() + more;
+    std::fs::write(&session, declared).unwrap();
+    session
+}
+
 fn success(done: &Output) -> String {
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     String::from_utf8(done.stdout.clone()).unwrap()
@@ -199,14 +212,7 @@ fn a_comparison_names_what_has_changed() {
 #[test]
 fn an_error_motion_is_not_exported_as_a_location_error() {
     let folder = folder();
-    let bundled = ready("hermle-c600u/measured/session.toml");
-    for entry in std::fs::read_dir(bundled.parent().unwrap()).unwrap() {
-        let path = entry.unwrap().path();
-        std::fs::copy(&path, folder.path().join(path.file_name().unwrap())).unwrap();
-    }
-    let session = folder.path().join("session.toml");
-    let declared = std::fs::read_to_string(&session).unwrap() + "\n[unknowns]\nerrors = [\"EY0C\", \"EXC\"]\n";
-    std::fs::write(&session, declared).unwrap();
+    let session = bundled_with(folder.path(), "\n[unknowns]\nerrors = [\"EY0C\", \"EXC\"]\n");
     let (model, out) = (folder.path().join("model.json"), folder.path().join("table.csv"));
     success(&abbe(&["fit", text(&session), "--save", text(&model), "--quiet"]));
     let printed = success(&abbe(&["export", text(&model), "--as", "beckhoff", "--out", text(&out)]));
@@ -266,15 +272,8 @@ fn entries_of_a_control_state_what_remains() {
 #[test]
 fn a_fixed_geometry_states_what_the_effects_leave() {
     let folder = folder();
-    let bundled = ready("hermle-c600u/measured/session.toml");
-    for entry in std::fs::read_dir(bundled.parent().unwrap()).unwrap() {
-        let path = entry.unwrap().path();
-        std::fs::copy(&path, folder.path().join(path.file_name().unwrap())).unwrap();
-    }
-    let session = folder.path().join("session.toml");
     let effect = "\n[[effect]]\ncomponent = \"EYA\"\ndriver = \"A\"\nshape = \"harmonic\"\norder = 2\n";
-    let declared = std::fs::read_to_string(&session).unwrap() + effect;
-    std::fs::write(&session, declared).unwrap();
+    let session = bundled_with(folder.path(), effect);
     let [model, out, json] = ["model.json", "machine.urdf", "export.json"].map(|name| folder.path().join(name));
     success(&abbe(&["fit", text(&session), "--save", text(&model), "--quiet"]));
     let printed = success(&abbe(&["export", text(&model), "--as", "urdf", "--out", text(&out), "--json", text(&json)]));

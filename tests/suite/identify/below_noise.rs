@@ -67,6 +67,15 @@ fn nothing_passes(found: &Value, screen: &str, why: &str) {
     }
 }
 
+/// A certificate is refused for this reason.
+fn no_certificate(session: &Path, why: &str) {
+    fs::write(session.with_file_name("certificate.toml"), abbe::certificate::EXAMPLE).unwrap();
+    let out = session.with_file_name("certificate.xml");
+    let run = abbe(&["fit", text(session), "--dcc", text(&out)]);
+    let said = String::from_utf8_lossy(&run.stderr);
+    assert!(!run.status.success() && !out.exists() && said.contains(why), "{said}");
+}
+
 #[test]
 fn deviations_in_mm_under_um_pass_nothing() {
     let folder = tempfile::tempdir().unwrap();
@@ -85,12 +94,7 @@ fn deviations_in_mm_under_um_pass_nothing() {
         assert_eq!(found["conflicts"][0]["kind"], "unit");
         assert!(screen.contains("mm under µm"), "{screen}");
     }
-    let certificate = folder.path().join("certificate.toml");
-    fs::write(&certificate, abbe::certificate::EXAMPLE).unwrap();
-    let out = folder.path().join("certificate.xml");
-    let run = abbe(&["fit", text(&file), "--dcc", text(&out)]);
-    let said = String::from_utf8_lossy(&run.stderr);
-    assert!(!run.status.success() && !out.exists() && said.contains("less than a tenth of the noise"), "{said}");
+    no_certificate(&file, "less than a tenth of the noise");
 }
 
 /// A noise that is stated three times too large is no other unit: the estimates may be quoted, and nothing is decided. One that
@@ -106,12 +110,7 @@ fn a_noise_that_is_stated_too_large_is_not_judged() {
     let decisions: Vec<&str> = items.iter().map(|item| item["decision"].as_str().unwrap()).collect();
     assert_eq!(decisions, ["undecided"; 3]);
     assert!(found["conflicts"].as_array().is_none_or(Vec::is_empty), "{}", found["conflicts"]);
-    let certificate = folder.path().join("certificate.toml");
-    fs::write(&certificate, abbe::certificate::EXAMPLE).unwrap();
-    let out = folder.path().join("certificate.xml");
-    let run = abbe(&["fit", text(&file), "--dcc", text(&out)]);
-    let said = String::from_utf8_lossy(&run.stderr);
-    assert!(!run.status.success() && !out.exists() && said.contains("far below the noise"), "{said}");
+    no_certificate(&file, "far below the noise");
     let agrees = tempfile::tempdir().unwrap();
     let file = written(agrees.path(), &drawn(0.27));
     let (found, screen) = result("fit", &file, &[]);

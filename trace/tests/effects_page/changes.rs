@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 use abbe_identify::noise::{Noise, NoiseSource};
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
+use abbe_model::driver::Driver;
 use abbe_model::effect::Effect;
 use abbe_model::session::{Prior, Session};
 use nalgebra::DMatrix;
@@ -65,7 +66,9 @@ pub fn changes(mut session: Session, effects: &[Effect]) -> Changes {
         for (place, parameter) in list.iter().enumerate() {
             if wanted(parameter.role) {
                 // Slopes over a linear axis count at 100 mm, as other powers do.
-                let is_slope = parameter.unit.name.ends_with("/m") && !parameter.id.contains("gravity");
+                let follows_axis = |effect: usize| matches!(problem.parameters.effects[effect].driver, Driver::Axis(_));
+                let is_slope = parameter.unit.name.ends_with("/m")
+                    && matches!(parameter.role, Role::Coefficient { effect, .. } if follows_axis(effect));
                 let unit = match (parameter.id.starts_with("gain"), is_slope) {
                     (true, _) => 1e3,
                     (false, true) => 10.0,
