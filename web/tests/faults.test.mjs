@@ -63,7 +63,7 @@ test("a result goes with the session and the text that it is of", async () => {
   assert.equal(await page.locator("[data-kind]").count(), 0);
   await fitted(page);
   const text = page.getByLabel("Text of two/session.toml");
-  await page.getByText("Files", { exact: true }).click();
+  await page.getByText("Files", { exact: true }).press("Enter");
   await text.fill(`${await text.inputValue()}\n`);
   await page.locator("[data-kind]").waitFor({ state: "detached" });
   assert.deepEqual(wrong, []);
