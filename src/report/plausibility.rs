@@ -9,7 +9,12 @@ use super::table::{Cell, Table, cells};
 /// What the readings contradict, in a sentence; `None` if nothing.
 pub fn headline(plausibility: &Plausibility) -> Option<String> {
     let subjects: Vec<&str> = plausibility.conflicts.iter().map(|conflict| conflict.subject.as_str()).collect();
-    (!subjects.is_empty()).then(|| format!("The readings contradict the session: {}.", subjects.join(", ")))
+    let named = subjects.iter().any(|subject| *subject != "session");
+    match (subjects.is_empty(), named) {
+        (true, _) => None,
+        (false, true) => Some(format!("The readings contradict the session: {}.", subjects.join(", "))),
+        (false, false) => Some("The readings contradict the session.".to_string()),
+    }
 }
 
 /// The section of conflicts, if the readings contradict the session.
@@ -30,6 +35,8 @@ pub fn section(report: &mut Report, plausibility: &Plausibility) {
     report.key(Table::new(["set-up parameter", ">estimate", ">stated u", "unit", ">pull"], rows));
     let cause = |cause: &Suggestion| format!("{} (residual {})", cause.words, micrometres(cause.rms_um));
     match plausibility.suggestions.as_slice() {
+        // A unit is named with the conflict.
+        [] if plausibility.conflicts.iter().all(|conflict| conflict.kind == ConflictKind::Unit) => {}
         [] => report.key("No single mistake among those tried explains this."),
         [one] => report.key(format!("Explained if {}.", cause(one))),
         several => {

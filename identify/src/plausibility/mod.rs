@@ -194,14 +194,19 @@ fn one_clause(clauses: &[&str]) -> String {
     let shortest = words.iter().map(Vec::len).min().unwrap_or(0);
     let first = &words[0];
     let begin = (0..shortest).take_while(|i| words.iter().all(|other| other[*i] == first[*i])).count();
-    let end = (1..=shortest.saturating_sub(begin + 1))
-        .take_while(|i| words.iter().all(|other| other[other.len() - i] == first[first.len() - i]))
-        .count();
+    // A clause with a part of its own keeps its end.
+    let has_parts = clauses.iter().any(|clause| clause.contains(','));
+    let most = if has_parts { 0 } else { shortest.saturating_sub(begin + 1) };
+    let end =
+        (1..=most).take_while(|i| words.iter().all(|other| other[other.len() - i] == first[first.len() - i])).count();
     let middles: Vec<String> = (words.iter()).map(|words| words[begin..words.len() - end].join(" ")).collect();
     let (Some((last, others)), true) = (middles.split_last(), words.len() > 1 && begin + end > 0) else {
         return clauses.join(" or ");
     };
-    let middle = format!("{} or {last}", others.join(", "));
+    let middle = match has_parts {
+        true => format!("{}; or {last}", others.join("; ")),
+        false => format!("{} or {last}", others.join(", ")),
+    };
     let parts = [first[..begin].join(" "), middle, first[first.len() - end..].join(" ")];
     let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
     parts.join(" ")
@@ -399,5 +404,13 @@ mod tests {
             "the bar of C150, spindle ball of C150 or workpiece ball of P1 is not as it is stated"
         );
         assert_eq!(one_clause(&["one", "another case"]), "one or another case");
+        assert_eq!(
+            one_clause(&[
+                "P was moved before B",
+                "P was moved before A, for B and C too",
+                "P was moved before B, for C too"
+            ]),
+            "P was moved before B; A, for B and C too; or B, for C too"
+        );
     }
 }
