@@ -7,6 +7,7 @@ use abbe::apply::compare::{CompareOptions, Input, compare_inputs};
 use abbe::document::{Document, Origin, StatedComparison};
 use abbe::identify::model_file::IdentifiedModel;
 use abbe::report::block::Report;
+use abbe::report::commands::Commands;
 use abbe::report::compare::report;
 use pyo3::prelude::*;
 
@@ -108,6 +109,6 @@ impl Comparison {
 
 impl Comparison {
     fn report(&self) -> Report {
-        report(&self.machine, &StatedComparison::of_comparison(&self.found), self.with_workspace)
+        report(&self.machine, &StatedComparison::of_comparison(&self.found), self.with_workspace, &Commands::default())
     }
 }

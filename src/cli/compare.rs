@@ -84,15 +84,17 @@ pub fn run(arguments: &CompareArguments) -> Result<(), Failure> {
     };
     let found = compare_inputs(names, given, &options, common.seed)?;
     let mut from = Read { seed: Some(common.seed), ..Read::default() };
-    for (input, from_files) in &inputs {
-        match (input, from_files) {
+    for input in &inputs {
+        match input {
             (Input::Session(session), InputFiles::Session(sources)) => from.sessions.push((session, sources)),
             (_, InputFiles::Model(stamp)) => from.files.extend(stamp),
             _ => {}
         }
     }
     let stated = StatedComparison::of_comparison(&found);
-    let report = report::compare::report(&inputs[0].0.machine().name, &stated, arguments.places > 0);
+    let commands = arguments.data.commands(Path::new(""));
+    let machine = &inputs[0].0.machine().name;
+    let report = report::compare::report(machine, &stated, arguments.places > 0, &commands);
     common.output.put(&outputs, &report, &stated, &from)
 }
 

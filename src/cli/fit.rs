@@ -80,7 +80,9 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         propagation::add_monte_carlo(&problem, &found, draws, &mut result)?;
     }
     arguments.forms.add(&problem, &found, &mut result)?;
-    let commands = arguments.session.commands("fit", &common.repeated(&arguments.assume));
+    let repeated: Vec<_> =
+        common.repeated(&arguments.assume).into_iter().chain(arguments.plausibility.repeated()).collect();
+    let commands = arguments.session.commands("fit", &repeated);
     let stated = StatedFit::of_fit(&problem, &result);
     let report = report::fit::report(&problem, &found, &stated, &commands, common.output.figures())?;
     common.output.put(&outputs, &report, &stated, &read)?;

@@ -45,7 +45,7 @@ mod validate;
 mod values;
 mod volumetric;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use abbe::files::{self, ReadOptions, SourceMap};
@@ -170,6 +170,11 @@ impl DataArguments {
     fn options(&self) -> ReadOptions {
         ReadOptions { data_directory: self.data.clone(), allow_outside: self.allow_outside, ..ReadOptions::default() }
     }
+
+    /// How command lines name a session that is read with these options.
+    fn commands(&self, session: &Path) -> Commands {
+        Commands::of(session, self.data.as_deref(), self.allow_outside)
+    }
 }
 
 /// What an identification does with estimates that mean nothing.
@@ -190,6 +195,11 @@ impl PlausibilityArguments {
             )));
         }
         Ok(())
+    }
+
+    /// The option, for a command line that repeats the result.
+    fn repeated(self) -> Option<(&'static str, String)> {
+        self.allow_implausible.then(|| ("--allow-implausible", String::new()))
     }
 
     /// Refuses estimates that mean nothing and have a cause.
@@ -216,7 +226,7 @@ impl SessionArguments {
 
     /// How command lines name the session after a command with these options, on which its result depends.
     fn commands(&self, verb: &'static str, options: &[(&str, String)]) -> Commands {
-        Commands::of(&self.session, self.data.data.as_deref(), self.data.allow_outside).made_by(verb, options)
+        self.data.commands(&self.session).made_by(verb, options)
     }
 }
 

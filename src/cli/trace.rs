@@ -91,7 +91,8 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     let ends = (arguments.time_limit, common.output.quiet);
     let trace = progress::trace(&session, &options, arguments.plausibility, ends)?;
     let stated = StatedTrace::of_trace(&trace);
-    let repeated = [common.repeated(&arguments.assume), arguments.search.repeated()].concat();
+    let accepted: Vec<_> = arguments.plausibility.repeated().into_iter().collect();
+    let repeated = [common.repeated(&arguments.assume), arguments.search.repeated(), accepted].concat();
     let commands = arguments.session.commands("trace", &repeated);
     let report = present::report(&trace, &stated, &commands, common.output.figures())?;
     common.output.put(&outputs, &report, &stated, &Read::session(&session, &sources, common.seed))?;

@@ -40,6 +40,11 @@ impl Commands {
         Commands { session: session.display().to_string(), reading, ..Commands::default() }
     }
 
+    /// The same for another session, which is read with the same options.
+    pub fn for_session(&self, session: &Path) -> Commands {
+        Commands { session: session.display().to_string(), ..self.clone() }
+    }
+
     /// The same for the report of a command with these options, on which its result depends: its name in a proposed
     /// command has them too.
     pub fn made_by(self, verb: &'static str, options: &[(&str, String)]) -> Commands {

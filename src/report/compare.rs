@@ -6,6 +6,7 @@ use abbe::identify::results::Outlier;
 use abbe::model::words::counted;
 
 use super::block::{Report, Text};
+use super::commands::Commands;
 use super::figure::bars::{Row, Value, Values};
 use super::figure::{Chart, Figure, Quantity};
 use super::number::{p_equals, probability, quantity, unit, units, value_and_u};
@@ -23,14 +24,15 @@ const MAX_ROWS: usize = 30;
 const METHOD: &str = "Sessions are fitted with the errors and effects that any input has, models included, so that their \
      parameters are the same. A difference is significant if Holm's procedure rejects that it is zero.";
 
-/// The report of a comparison of models of this machine; `with_workspace`, whether the volumetric error is asked for.
-pub fn report(machine: &str, stated: &StatedComparison<'_>, with_workspace: bool) -> Report {
+/// The report of a comparison of models of this machine; `with_workspace`, whether the volumetric error is asked for. `commands`
+/// have the options with which sessions are read.
+pub fn report(machine: &str, stated: &StatedComparison<'_>, with_workspace: bool, commands: &Commands) -> Report {
     let comparison = stated.result;
     let mut report = Report::new(format!("Comparison of models of {machine}"));
     report.method = METHOD.to_string();
     report.values = values(comparison);
     let pairs = comparison.pairs.iter().enumerate().map(|(number, pair)| sentence(comparison, number, pair).into());
-    report.opening("", pairs.chain(statements::of_comparison(comparison, &stated.statements)));
+    report.opening("", pairs.chain(statements::of_comparison(comparison, &stated.statements, commands)));
     for pair in &comparison.pairs {
         report.section(&format!("{} → {}", pair.from, pair.to));
         report.key(Text::List(remarks(comparison, pair)));

@@ -150,10 +150,11 @@ fn tracker(chain: &Chain, point: &str, target_mm: [f64; 3], columns: &[String]) 
     let mut text = format!(
         "# A plan for a laser tracker: each joint turns alone with the target at {} in the frame of the flange.\n\
          # `abbe plan plan.toml` says what these tests identify, `abbe poses plan.toml --poses 60` chooses poses instead.\n\
-         # Measured poses: `abbe import poses.csv --session plan.toml`, columns {}, px_mm, py_mm, pz_mm.\n\n\
+         # Measured poses: `abbe import poses.csv --session plan.toml --like {}`, columns {}, px_mm, py_mm, pz_mm.\n\n\
          [machine]\nfile = \"machine.toml\"\n\n\
          [instrument]\nkind = \"tracker\"\n# Enter the standard deviation of one coordinate.\nnoise_um = 20\n",
         list(target_mm),
+        axis(0),
         columns.join(", ")
     );
     for (number, joint) in chain.joints.iter().enumerate() {

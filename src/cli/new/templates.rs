@@ -93,7 +93,7 @@ pub const TEMPLATES: &[Template] = &[
     },
     Template {
         name: "volumetric",
-        about: "five-axis machine with 33 error functions, to map and to compensate (`abbe volumetric --map`)",
+        about: "five-axis machine with 33 error functions, to map and to compensate",
         files: files!("volumetric": "machine.toml", "errors.toml"),
     },
     Template {

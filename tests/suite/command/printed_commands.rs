@@ -37,40 +37,48 @@ fn written(command: &str) -> Vec<String> {
     files.map(|pair| pair[1].to_string()).collect()
 }
 
-/// The screens of a session in a folder, and every command that they print. Returns their number.
-fn every_printed_command_runs(folder: &Path, session: &str, of_trace: &str) -> usize {
-    let mut count = 0;
-    for verb in ["plan", "fit", "trace"] {
-        // Each screen stands alone: what another one writes is not there.
-        let own = tempfile::tempdir().unwrap();
-        copy(folder, own.path());
-        let more = if verb == "trace" { of_trace } else { "" };
-        let screen = shell(&format!("abbe {verb} {session} {more}"), own.path());
-        let said = String::from_utf8(screen.stderr).unwrap();
-        if said.contains("has no readings") {
-            continue;
+/// Runs a screen in a folder, and every command that it prints in a copy of it: what the commands of another screen write is
+/// not there. Returns their number, `None` if the session has no readings.
+fn printed_commands_run(line: &str, folder: &Path) -> Option<usize> {
+    let screen = shell(line, folder);
+    let said = String::from_utf8(screen.stderr).unwrap();
+    if said.contains("has no readings") {
+        return None;
+    }
+    assert!(screen.status.success(), "{line}: {said}");
+    let screen = String::from_utf8(screen.stdout).unwrap() + &said;
+    let commands = commands(&screen);
+    let place = tempfile::tempdir().unwrap();
+    copy(folder, place.path());
+    let mut meaning: BTreeMap<String, &str> = BTreeMap::new();
+    for command in &commands {
+        for file in written(command) {
+            let other = meaning.insert(file.clone(), command);
+            assert!(other.is_none(), "{file} of {line}: `{command}` and `{}`", other.unwrap_or_default());
+            assert!(!place.path().join(&file).exists(), "{file} of {line} exists before `{command}`");
         }
-        assert!(screen.status.success(), "{verb} {session}: {said}");
-        let screen = String::from_utf8(screen.stdout).unwrap() + &said;
-        let commands = commands(&screen);
-        assert!(!commands.is_empty(), "{verb} {session}: {screen}");
-        let mut meaning: BTreeMap<String, &str> = BTreeMap::new();
-        for command in &commands {
-            for file in written(command) {
-                let other = meaning.insert(file.clone(), command);
-                assert!(other.is_none(), "{file}: `{command}` and `{}`", other.unwrap_or_default());
-                assert!(!own.path().join(&file).exists(), "{file} exists before `{command}`");
-            }
-            let run = shell(command, own.path());
-            let said = String::from_utf8_lossy(&run.stderr);
-            assert!(run.status.success(), "{verb} {session} prints `{command}`, which fails: {said}\n{screen}");
-            for file in written(command) {
-                assert!(own.path().join(&file).exists(), "`{command}` of {verb} {session} writes no {file}: {said}");
-            }
-            count += 1;
+        let run = shell(command, place.path());
+        let said = String::from_utf8_lossy(&run.stderr);
+        assert!(run.status.success(), "{line} prints `{command}`, which fails: {said}\n{screen}");
+        for file in written(command) {
+            assert!(place.path().join(&file).exists(), "`{command}` of {line} writes no {file}: {said}");
         }
     }
-    count
+    Some(commands.len())
+}
+
+/// The screens of a session in a folder, and every command that they print. Returns their number.
+fn every_printed_command_runs(folder: &Path, session: &str, of_trace: &str) -> usize {
+    let lines = ["plan", "fit", "trace"].map(|verb| match verb {
+        "trace" => format!("abbe trace {session} {of_trace}"),
+        verb => format!("abbe {verb} {session}"),
+    });
+    let counts = lines.iter().filter_map(|line| {
+        let count = printed_commands_run(line, folder)?;
+        assert!(count > 0, "{line} prints no command");
+        Some(count)
+    });
+    counts.sum()
 }
 
 /// Copies a folder.
@@ -151,4 +159,89 @@ fn a_plan_after_a_trace_knows_what_the_trace_found() {
     let planned: Vec<String> = commands(&screen).into_iter().filter(|line| line.starts_with("abbe plan ")).collect();
     assert!(planned.iter().all(|line| line.contains("traced.toml")), "{screen}");
     assert!(every_printed_command_runs(&run, "session.toml", only) > 3);
+}
+
+/// The commands in the comments of a session file. One may continue on the next line; a name alone, as `abbe trace`, is none.
+fn in_comments(file: &Path) -> Vec<String> {
+    let contents = std::fs::read_to_string(file).unwrap();
+    let comments: Vec<&str> = contents.lines().filter_map(|line| line.strip_prefix("# ")).collect();
+    let commands = commands(&comments.join(" ")).into_iter().filter(|command| command.contains(".toml"));
+    commands.map(|command| command.replace(" --error …", "")).collect()
+}
+
+/// The screens that compare, validate, prepare, correct and show machines over time, and the comments of sessions: each
+/// command runs with the options that its session needs, and two of one screen do not write one file.
+#[test]
+fn commands_of_further_screens_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    let edit = |name: &str, old: &str, new: &str| {
+        let contents = std::fs::read_to_string(place(name)).unwrap();
+        assert!(contents.contains(old), "{old} in {contents}");
+        std::fs::write(place(name), contents.replacen(old, new, 1)).unwrap();
+    };
+    let run = |lines: &[&str]| -> usize {
+        lines.iter().map(|line| printed_commands_run(line, folder.path()).expect("the screen")).sum()
+    };
+    copy(&workspace().join("sessions"), folder.path());
+    copy(&workspace().join("tests/foreign"), &place("foreign"));
+    std::fs::copy(workspace().join("tests/robots/iiwa14.urdf"), place("robot.urdf")).unwrap();
+    std::fs::write(place("program.csv"), "x_mm,y_mm,z_mm,a_deg,c_deg\n10,20,0,-5,90\n").unwrap();
+    let effect = "[[effect]]\ncomponent = \"EY0A\"\ndriver = \"time\"\nshape = \"drift\"\n";
+    copy(&place("hermle-c600u/measured"), &place("mill"));
+    edit("mill/session.toml", "\n[[test]]", &format!("\n[about]\ndate = \"2024-01-01\"\n\n{effect}\n[[test]]"));
+    run(&[
+        "abbe simulate mill/session.toml --out before --hide-effects --draw-setups",
+        "abbe simulate mill/session.toml --out after --hide-effects --draw-setups --seed 2 --error EY0A=20um",
+        "abbe simulate mill/session.toml --out drift --hide-effects --effect EY0A~time:drift=10um/h",
+        "abbe import foreign/units-line.txt --machine ur10/machine.toml --out arm",
+        "abbe new mine --from-code '[wCXbYZAt]'",
+        "abbe new robot --from-urdf robot.urdf",
+        "abbe simulate robot/plan.toml --out poses",
+    ]);
+    // A second session beside another, one without its readings, and a robot of which a joint turns in the other sense.
+    std::fs::copy(place("drift/session.toml"), place("drift/second.toml")).unwrap();
+    std::fs::create_dir(place("apart")).unwrap();
+    for name in ["session.toml", "machine.toml"] {
+        std::fs::copy(place("drift").join(name), place("apart").join(name)).unwrap();
+    }
+    edit("arm/session.toml", "kind = \"tracker\"", "kind = \"tracker\"\nnoise_um = 50");
+    let machine = std::fs::read_to_string(place("arm/machine.toml")).unwrap();
+    let joint = &machine[machine.find("[axis.J4]").unwrap()..];
+    edit("arm/machine.toml", joint, &joint.replacen("[0, -1, 0]", "[0, 1, 0]", 1));
+    // Measured poses have the name that the comments of a plan give them.
+    std::fs::rename(place("poses/J1.csv"), place("robot/poses.csv")).unwrap();
+    std::fs::remove_dir_all(place("poses")).unwrap();
+    let count = run(&[
+        "abbe fit before/session.toml --save before.json",
+        "abbe fit drift/session.toml --save drift.json",
+        "abbe compare before/session.toml after/session.toml",
+        "abbe compare before/session.toml drift/session.toml",
+        "abbe compare before.json drift.json",
+        "abbe compare drift/session.toml drift/second.toml",
+        "abbe compare apart/session.toml after/session.toml --data drift",
+        "abbe validate before.json after/session.toml",
+        "abbe validate before.json apart/session.toml --data drift",
+        "abbe compensate before.json program.csv --out corrected.csv",
+        "abbe export before.json --as linuxcnc --out kinematics.csv",
+        "abbe nc hermle-c600u/chapter4.toml --control linuxcnc --out linuxcnc",
+        "abbe nc hermle-c600u/chapter4.toml --control siemens --out siemens",
+        "abbe sheet hermle-c600u/chapter4.toml --control siemens --out sheets.html",
+        "abbe fit arm/session.toml --allow-implausible",
+        "abbe new",
+        "abbe plan mine/plan.toml",
+        "abbe plan robot/plan.toml",
+        "abbe fleet run before after drift --out results --no-trace",
+        "abbe fleet history results",
+    ]);
+    assert!(count >= 20, "{count}");
+    for file in sessions(folder.path()) {
+        for command in in_comments(&file) {
+            let there = tempfile::tempdir().unwrap();
+            copy(file.parent().unwrap(), there.path());
+            let output = shell(&command, there.path());
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success(), "`{command}` in {}: {said}", file.display());
+        }
+    }
 }
