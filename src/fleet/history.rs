@@ -84,8 +84,8 @@ pub fn statements(machines: &[MachineHistory]) -> HistoryStatements {
         let own = machine.parameters.iter().map(|one| ChangedInHistory {
             machine_id: machine.machine_id.clone(),
             id: one.id.clone(),
-            drift_per_year: one.drift_per_year.filter(|_| !is_explained),
-            shift: shift_of(one),
+            drift_per_year: one.drift_per_year.filter(|drift| !is_explained && exceeds_u(drift)),
+            shift: shift_of(one).filter(exceeds_u),
             unit: one.unit.clone(),
         });
         own.filter(|one| one.drift_per_year.is_some() || one.shift.is_some()).collect()
@@ -102,6 +102,12 @@ pub fn statements(machines: &[MachineHistory]) -> HistoryStatements {
         further: Vec::new(),
         measure: step.into(),
     }
+}
+
+/// Whether a change exceeds its standard uncertainty. Sessions that repeat each other to a fraction of it, such as computed ones,
+/// show changes that mean nothing.
+fn exceeds_u(change: &Estimate) -> bool {
+    change.value.abs() > change.u
 }
 
 /// A session, a note or a row of known compensations that the history does not use.

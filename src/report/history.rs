@@ -164,7 +164,10 @@ fn opening(statements: &HistoryStatements, machines: &[MachineHistory]) -> Vec<S
     let first = dated.min_by(|a, b| a.1.total_cmp(&b.1));
     let check = first.map(|(machine, days)| (machine.machine_id.as_str(), date(days)));
     let beyond_ten_years = machines.iter().any(|machine| machine.due == Due::BeyondTenYears);
-    statements::of_history(statements, check, beyond_ten_years)
+    let [followed, determined] = machines
+        .iter()
+        .fold([0, 0], |[followed, determined], machine| [followed + machine.followed, determined + machine.determined]);
+    statements::of_history(statements, check, beyond_ten_years, (followed, determined))
 }
 
 /// Whether a parameter has a drift or a step.
@@ -204,7 +207,10 @@ fn machines(found: &FleetHistory) -> Table {
             date(machine.last_days),
             drifting.to_string(),
             machine.changes.len().to_string(),
-            first_of(&machine.out_of_control, MOST_NAMES, ", ", ""),
+            match machine.validation {
+                Some(_) if machine.out_of_control.is_empty() => "its model".to_string(),
+                _ => first_of(&machine.out_of_control, MOST_NAMES, ", ", ""),
+            },
             next_check(machine),
             machine.due_parameter.clone().unwrap_or_default()
         ]
@@ -270,7 +276,12 @@ fn followed(machines: &[MachineHistory]) -> Vec<String> {
             own.machine_id, own.followed, own.determined
         )
     };
-    incomplete.map(sentence).collect()
+    let invalid = machines.iter().filter_map(|own| {
+        let verdict = own.validation?;
+        let words = "its model does not describe the latest session; identify the machine anew";
+        Some(format!("{}: validation {verdict}: {words}", own.machine_id))
+    });
+    incomplete.map(sentence).chain(invalid).collect()
 }
 
 /// The decisions of conformity of all machines: the latest one of each quantity, those that fail first.

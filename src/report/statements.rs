@@ -24,7 +24,6 @@ use super::block::Sentence;
 use super::commands::{Commands, MEASURE, NEXT, PROGRAMS};
 use super::number::{fixed, places, quantity, three_digits, value_and_u};
 use super::parameters::PRIOR;
-use super::provenance::quoted;
 use super::quality::agreement;
 use super::table::{Cell, Table, cells};
 
@@ -298,6 +297,7 @@ pub fn of_validation(
 pub fn of_comparison(
     comparison: &Comparison,
     statements: &Statements<ComparisonStatement, Difference>,
+    commands: &Commands,
 ) -> Vec<Sentence> {
     let last = comparison.inputs.last().map_or("", String::as_str);
     let changed = statements.changed.iter().map(|d| format!("{} {}", d.id, estimate(d.value, d.u, &d.unit)));
@@ -323,14 +323,14 @@ pub fn of_comparison(
         NextStep::Repeat => {
             "the last session once more, mounted anew: it tells a change of the machine from one of the set-up"
         }
-        NextStep::Trace => return before_comparison(comparison),
+        NextStep::Trace => return before_comparison(comparison, commands),
         _ => "nothing before the next check",
     };
     vec![format!("What has changed: {changed}").into(), correct.into(), format!("What to measure next: {next}").into()]
 }
 
 /// What comes before a comparison of inputs of which one lacks an effect.
-fn before_comparison(comparison: &Comparison) -> Vec<Sentence> {
+fn before_comparison(comparison: &Comparison, commands: &Commands) -> Vec<Sentence> {
     let mut sentences: Vec<Sentence> = (comparison.not_judged.iter())
         .map(|own| {
             let ratio = three_digits(own.birge_ratio.powi(2));
@@ -343,15 +343,26 @@ fn before_comparison(comparison: &Comparison) -> Vec<Sentence> {
             .to_string()
             .into(),
     );
+    let mut written: Vec<String> = Vec::new();
     for own in &comparison.not_judged {
-        let session = match own.is_session {
-            true => quoted(own.input.clone()),
-            // A model has no readings.
-            false => "SESSION".to_string(),
+        // A model has no readings.
+        if !own.is_session {
+            let words = "trace the session from which it was identified, save that model, and compare it instead";
+            sentences.push(format!("{}: {words}", own.input).into());
+            continue;
+        }
+        let of_session = commands.for_session(Path::new(&own.input));
+        // Two sessions of one folder write two files.
+        let beside = match of_session.beside(TRACED) {
+            name if written.contains(&name) => {
+                let stem = Path::new(&own.input).file_stem().unwrap_or_default().to_string_lossy();
+                of_session.beside(&format!("{stem}-{TRACED}"))
+            }
+            name => name,
         };
-        let written = quoted(Path::new(&own.input).with_file_name(TRACED).display().to_string());
-        let command = format!("abbe trace {session} --write {written}");
+        let command = of_session.command("trace", &format!("--write {beside}"));
         sentences.push(Sentence::Command(command, format!("finds the effect behind {}", own.input)));
+        written.push(beside);
     }
     sentences
 }
@@ -362,12 +373,18 @@ pub fn of_history(
     statements: &HistoryStatements,
     check: Option<(&str, String)>,
     beyond_ten_years: bool,
+    (followed, determined): (usize, usize),
 ) -> Vec<String> {
     let out = &statements.good.out_of_control;
+    let is_unchanged = statements.correct.is_empty() && statements.changed.is_empty();
     let control = match out.len() {
-        0 if statements.correct.is_empty() && statements.changed.is_empty() => {
-            "No machine is out of control".to_string()
+        0 if is_unchanged && followed == 0 => {
+            "Not judged: no parameter is determined in enough sessions to be followed".to_string()
         }
+        0 if is_unchanged && followed < determined => {
+            format!("No machine is out of control in the {followed} of {determined} parameters that are followed")
+        }
+        0 if is_unchanged => "No machine is out of control".to_string(),
         0 => "Within the limits of the control charts since the last change".to_string(),
         _ => format!("Out of control: {}", first_of(out, NAMED, ", ", "further machine")),
     };
@@ -386,6 +403,7 @@ pub fn of_history(
         first_of(&list.iter().map(in_words).collect::<Vec<_>>(), NAMED, ", ", "further parameter")
     };
     let correct = match (statements.correct.is_empty(), statements.changed.is_empty()) {
+        (true, true) if followed == 0 => "not judged".to_string(),
         (true, true) => "nothing; no parameter drifts or has shifted".to_string(),
         (true, false) => {
             format!("nothing. Explained by a compensation or an adjustment: {}", listed(&statements.changed))
@@ -436,6 +454,17 @@ mod tests {
     use abbe::identify::results::{Goodness, GoodnessVerdict};
 
     use super::*;
+
+    /// What is not followed is not cleared.
+    #[cfg(feature = "fleet")]
+    #[test]
+    fn a_history_clears_what_it_follows_alone() {
+        let statements = crate::fleet::history::statements(&[]);
+        let said = |followed: usize| of_history(&statements, None, false, (followed, 18)).join("; ");
+        assert!(said(18).starts_with("No machine is out of control; What to correct: nothing"), "{}", said(18));
+        assert!(said(10).starts_with("No machine is out of control in the 10 of 18 parameters"), "{}", said(10));
+        assert!(said(0).starts_with("Not judged: ") && said(0).contains("correct: not judged"), "{}", said(0));
+    }
 
     /// A residual that is taken for noise may still have structure: the unit is in doubt only where it is.
     #[test]

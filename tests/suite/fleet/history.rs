@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fs;
 
 use abbe::fleet::record::SCHEMA_VERSION;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::suite::abbe;
 use crate::suite::command::faults::TestFolder;
@@ -188,6 +188,31 @@ fn a_step_of_a_short_series_is_found_and_named() {
         assert!(screen.contains(id.as_str().unwrap()), "{screen}");
     }
     assert!(screen.contains("EC0Y"), "{screen}");
+}
+
+/// The control charts begin again after a step. A model of before the step does not hold in the latest session, and puts the
+/// machine out of control all the same; a model of after the step holds.
+#[test]
+fn a_model_that_does_not_hold_puts_its_machine_out_of_control() {
+    let place = sessions_with_a_step(6, 3);
+    for k in 0..6 {
+        // Both patterns of the readings together scatter by 0.49 µm.
+        let session = place.at(&format!("fleet/s{k:02}/session.toml"));
+        fs::write(&session, read(&session).replace("noise_um = 0.3", "noise_um = 0.5")).unwrap();
+    }
+    fs::create_dir(place.at("models")).unwrap();
+    for (session, verdict, out) in [("s00", json!("does-not-hold"), json!(["M"])), ("s05", Value::Null, json!([]))] {
+        let saved = place.shell(&format!("abbe fit fleet/{session}/session.toml --save models/M.json --quiet"));
+        assert!(saved.status.success(), "{}", String::from_utf8_lossy(&saved.stderr));
+        run(&place, "--no-trace --models models");
+        let found = history(&place, "");
+        let machine = &found["machines"][0];
+        assert_eq!((&machine["validation"], &machine["out_of_control"]), (&verdict, &json!([])), "{machine:#}");
+        assert_eq!(found["statements"]["good"]["out_of_control"], out, "{session}: {found:#}");
+        let screen = place.shell("abbe fleet history results");
+        let screen = String::from_utf8_lossy(&screen.stdout).to_string();
+        assert_eq!(screen.contains("Out of control: M"), session == "s00", "{screen}");
+    }
 }
 
 /// A serial number that is longer than the name of a file may be has a page, and stops none of another machine.
