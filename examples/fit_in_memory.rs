@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     add_node(&mut session, "test", test.into(), &columns)?;
 
     let fit = SessionFit::of(&session, 1)?;
-    println!("rank {} of {}", fit.result.rank, fit.result.parameter_count);
+    println!("rank {} of {}", fit.result.model.rank, fit.result.model.parameter_count);
     let offset = fit.parameter("EX0C").ok_or("EX0C is not identifiable")?;
     println!("EX0C = {:.2} ± {:.2} {}", offset.value, offset.u, offset.unit);
     Ok(())

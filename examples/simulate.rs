@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let given = vec![Given::parse("EX0C=10um")?];
     let simulated = simulate(&session, &Simulation { given, seed: 1, ..Simulation::default() })?;
     let fit = SessionFit::of(&session.with_readings(simulated.readings), 1)?;
-    for parameter in &fit.result.parameters {
+    for parameter in &fit.result.model.parameters {
         println!("{} = {:.2} ± {:.2} {}", parameter.id, parameter.value, parameter.u, parameter.unit);
     }
     Ok(())

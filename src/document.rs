@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 /// Version of the schemas of all documents.
-pub const SCHEMA_VERSION: u32 = 2;
+pub const SCHEMA_VERSION: u32 = 3;
 
 /// An input file with the checksum of the bytes that were read.
 fn input_file(stamp: &FileStamp) -> InputFile {

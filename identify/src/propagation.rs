@@ -64,17 +64,16 @@ pub fn add_monte_carlo(
         .zip(&distributions)
         .map(|(parameter, drawn)| compared(&parameter.id, parameter.value, parameter.u, &parameter.unit, drawn, draws))
         .collect();
-    let reported = result.parameters.iter_mut().zip(&of_noise).filter(|(parameter, _)| is_drawn(parameter));
+    let reported = result.model.parameters.iter_mut().zip(&of_noise).filter(|(parameter, _)| is_drawn(parameter));
     for ((parameter, of_noise), drawn) in reported.zip(&parameters) {
         if drawn.verdict != Verdict::Agree {
             let beside = (parameter.u * parameter.u - of_noise.u * of_noise.u).max(0.0).sqrt();
             parameter.set_u(drawn.u.hypot(beside));
         }
     }
-    phases_follow_amplitudes(&mut result.parameters);
-    let goodness = result.outcome.goodness;
-    result.conformity = conformity(&problem.session, &result.parameters, &result.circular, result.noise_um, goodness);
-    result.covariance = fit::covariance_of_parameters(problem, fit, &result.parameters);
+    phases_follow_amplitudes(&mut result.model.parameters);
+    result.conformity = conformity(&problem.session, &result.model, &result.circular);
+    result.model.covariance = fit::covariance_of_parameters(problem, fit, &result.model.parameters);
     if unconverged > 0 {
         result
             .warnings
@@ -220,7 +219,7 @@ mod tests {
         add_monte_carlo(&problem, &fit, &draws, &mut after).unwrap();
         let drawn = &after.monte_carlo.as_ref().unwrap().parameters;
         let mut covering = 0;
-        for ((before, after), drawn) in before.parameters.iter().zip(&after.parameters).zip(drawn) {
+        for ((before, after), drawn) in before.model.parameters.iter().zip(&after.model.parameters).zip(drawn) {
             assert_eq!((&before.id, &after.id), (&drawn.id, &drawn.id));
             // 2000 draws know a standard deviation to 1.6 %.
             assert!((after.u / before.u - 1.0).abs() < 0.08, "{}: {} and {}", before.id, before.u, after.u);

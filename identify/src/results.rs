@@ -39,8 +39,8 @@ pub use statements::{
     AxisCorrection, GoodStatement, LineQuantity, MeasureStatement, NextStep, Statements, ValidationStatement,
 };
 pub use trace::{
-    AliasResult, AlternativeResult, ChangedParameter, CurvePoint, EffectName, EffectResult, LargestOrder, ModelResult,
-    PriorResult, RejectedCandidate, Remainder, SeparatingTestResult, SeparationResult, ShapeParameter, TraceResult,
+    AliasResult, AlternativeResult, ChangedParameter, CurvePoint, EffectName, EffectResult, LargestOrder, PriorResult,
+    RejectedCandidate, Remainder, SeparatingTestResult, SeparationResult, ShapeParameter, TraceResult,
 };
 
 /// A reading that was excluded as an outlier.
@@ -67,9 +67,10 @@ pub struct OfAngles {
     pub heldout_rms_arcsec: f64,
 }
 
-/// Estimates of the parameters of a session, with their uncertainties.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct FitResult {
+/// A model of the readings: its estimates with their uncertainties, its residual, its held-out error, and what it does not
+/// determine. A fit is one; a trace has one before and one with the effects that it found.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct ModelResult {
     /// The unit of the figures of readings, in which their keys end; absent for µm.
     #[serde(skip_serializing_if = "ReadingUnit::is_micrometre")]
     pub reading_unit: ReadingUnit,
@@ -106,7 +107,7 @@ pub struct FitResult {
     pub parameter_count: usize,
     /// χ² of the fit, priors counted as observations.
     pub chi_square: f64,
-    /// Degrees of freedom of χ²: scalar readings plus priors less rank.
+    /// Degrees of freedom of χ²: scalar readings plus priors, less rank and estimated positions of steps.
     pub degrees_of_freedom: usize,
     /// The Birge ratio `√(χ²/ν)`. Below 1 where readings scatter less than `noise_um`.
     pub birge_ratio: f64,
@@ -127,6 +128,14 @@ pub struct FitResult {
     pub null_space: NullSpace,
     /// Readings excluded as outliers.
     pub outliers: Vec<Outlier>,
+}
+
+/// The fit of a session.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct FitResult {
+    /// The fitted model.
+    #[serde(flatten)]
+    pub model: ModelResult,
     /// Ball-bar figures of the tests whose path is a circle.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub circular: Vec<CircularTest>,

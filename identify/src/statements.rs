@@ -24,8 +24,8 @@ use crate::problem::Problem;
 use crate::results::validation::{MovedParameter, ValidationResult, ValidationVerdict};
 use crate::results::{
     AxisCorrection, Covariance, DeterminedBy, Finding, FitResult, GoodStatement, Goodness, GoodnessVerdict,
-    LineQuantity, MeasureStatement, NextStep, NotJudged, ParameterResult, Statements, TraceResult, Unobservable,
-    ValidationStatement,
+    LineQuantity, MeasureStatement, ModelResult, NextStep, NotJudged, ParameterResult, Statements, TraceResult,
+    Unobservable, ValidationStatement,
 };
 use crate::tolerance::Conformity;
 use crate::tolerance::rule::Decision;
@@ -39,53 +39,53 @@ const THOUSAND: f64 = 1e3;
 impl Statements {
     /// Of a fit.
     pub fn of_fit(problem: &Problem, result: &FitResult) -> Statements {
-        let goodness = result.outcome.goodness;
-        let measure = match base_step(&result.plausibility, goodness) {
+        let model = &result.model;
+        let measure = match base_step(&result.plausibility, model.outcome.goodness) {
             Some(step) => step,
             None if !has_candidates(problem) => NextStep::Nothing,
-            None if result.unobservable.is_empty() => NextStep::Improve,
-            None if is_exhausted(problem, &result.unobservable) => NextStep::AllDetermined,
+            None if model.unobservable.is_empty() => NextStep::Improve,
+            None if is_exhausted(problem, &model.unobservable) => NextStep::AllDetermined,
             None => NextStep::Identify,
         };
         let measure = MeasureStatement {
-            description: (measure == NextStep::AllDetermined).then(|| format!("rank {0} of {0}", result.rank)),
+            description: (measure == NextStep::AllDetermined).then(|| format!("rank {0} of {0}", model.rank)),
             ..measure.into()
         };
-        Statements {
-            good: good(goodness, result.conformity.as_ref()),
-            further: further(problem, &result.parameters),
-            correct: corrections(&problem.session.machine, &result.parameters, &result.covariance),
-            changed: Vec::new(),
-            measure,
-        }
+        Statements::of_model(problem, model, good(model, result.conformity.as_ref()), measure)
     }
 
     /// Of a trace; `problem` is the model with the found effects.
     pub fn of_trace(problem: &Problem, result: &TraceResult) -> Statements {
-        let goodness = result.outcome.goodness;
+        let model = &result.after;
         let separating = result.effects.iter().find_map(|effect| Some((effect, effect.separating_tests.first()?)));
         let measure = match (separating, &result.plausibility.conflicts[..]) {
-            (Some((effect, test)), []) => MeasureStatement {
+            (Some((effect, test)), []) if !result.interrupted => MeasureStatement {
                 step: NextStep::SeparatingTest,
                 test: (!test.name.is_empty()).then(|| test.name.clone()),
                 description: Some(test.test.clone()),
                 effect: Some(effect.name.meaning.clone()),
             },
             _ => {
-                let step = match base_step(&result.plausibility, goodness) {
+                let step = match base_step(&result.plausibility, model.outcome.goodness) {
+                    Some(NextStep::Trace) | None if result.interrupted => NextStep::Trace,
                     // The search has been made.
                     Some(NextStep::Trace) | None if !has_candidates(problem) => NextStep::Nothing,
-                    Some(NextStep::Trace) | None if result.unobservable.is_empty() => NextStep::Improve,
+                    Some(NextStep::Trace) | None if model.unobservable.is_empty() => NextStep::Improve,
                     Some(NextStep::Trace) | None => NextStep::Identify,
                     Some(step) => step,
                 };
                 step.into()
             }
         };
+        let good = GoodStatement { verdict: Some(result.verdict), ..good(model, result.conformity.as_ref()) };
+        Statements::of_model(problem, model, good, measure)
+    }
+
+    fn of_model(problem: &Problem, model: &ModelResult, good: GoodStatement, measure: MeasureStatement) -> Statements {
         Statements {
-            good: GoodStatement { verdict: Some(result.verdict), ..good(goodness, result.conformity.as_ref()) },
-            further: further(problem, &result.after.parameters),
-            correct: corrections(&problem.session.machine, &result.after.parameters, &result.after.covariance),
+            good,
+            further: further(problem, &model.parameters),
+            correct: corrections(&problem.session.machine, &model.parameters, &model.covariance),
             changed: Vec::new(),
             measure,
         }
@@ -149,14 +149,14 @@ fn base_step(plausibility: &Plausibility, goodness: Goodness) -> Option<NextStep
     }
 }
 
-fn good(goodness: Goodness, conformity: Option<&Conformity>) -> GoodStatement {
+fn good(model: &ModelResult, conformity: Option<&Conformity>) -> GoodStatement {
     let of = |decision: Decision| -> Vec<String> {
         let items = conformity.iter().flat_map(|conformity| &conformity.items);
         items.filter(|item| item.decision == decision).map(|item| item.id.clone()).collect()
     };
     GoodStatement {
         verdict: None,
-        goodness,
+        goodness: model.outcome.goodness,
         decision: conformity.map(|conformity| conformity.verdict),
         failed: of(Decision::Fail),
         undecided: of(Decision::Undecided),

@@ -65,7 +65,7 @@ impl Fit {
     }
 
     fn tables(&self) -> Vec<Table> {
-        estimate_tables(&self.fit.problem, &self.fit.fit, &self.fit.result.parameters)
+        estimate_tables(&self.fit.problem, &self.fit.fit, &self.fit.result.model.parameters)
     }
 
     fn residual_table(&self, py: Python<'_>) -> PyResult<Table> {

@@ -342,7 +342,7 @@ impl<'c> Stated<'c> {
     /// determined.
     pub fn xml(&self, problem: &Problem, result: &FitResult) -> Result<String, IdentifyError> {
         let refused = |why| Err(IdentifyError::NoCertificate { why });
-        if let Some(why) = result.outcome.goodness.forbids_decisions() {
+        if let Some(why) = result.model.outcome.goodness.forbids_decisions() {
             return refused(why);
         }
         if !result.plausibility.conflicts.is_empty() {
@@ -350,7 +350,7 @@ impl<'c> Stated<'c> {
         }
         let of_role = |id: &str| problem.parameters.list.iter().find(|known| known.id == id).map(|known| known.role);
         let (mut certified, mut coefficients) = (Vec::new(), Vec::new());
-        for own in &result.parameters {
+        for own in &result.model.parameters {
             match (of_role(&own.id), write::si_unit(&own.unit)) {
                 (Some(Role::Setup), _) => {}
                 (Some(Role::Error), Some(unit)) if own.u > 0.0 => certified.push((own, unit)),
@@ -360,7 +360,7 @@ impl<'c> Stated<'c> {
         if certified.is_empty() {
             return refused("the readings determine no error of the machine");
         }
-        let open = result.outcome.not_estimated.iter().filter(|own| of_role(&own.id) == Some(Role::Error));
+        let open = result.model.outcome.not_estimated.iter().filter(|own| of_role(&own.id) == Some(Role::Error));
         let open = open.map(|own| own.id.as_str()).collect();
         write::document(&write::Contents {
             session: &problem.session,

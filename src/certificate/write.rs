@@ -329,10 +329,10 @@ fn description(contents: &Contents) -> String {
 /// What was fitted, and how well.
 fn method(contents: &Contents) -> String {
     let result = contents.result;
-    let ratio = result.chi_square / result.degrees_of_freedom.max(1) as f64;
+    let ratio = result.model.chi_square / result.model.degrees_of_freedom.max(1) as f64;
     format!(
         "{} readings, {} of them excluded as outliers; chi-square over degrees of freedom {ratio:.3}; expanded uncertainty U = 2u from the covariance of the fit, with the stated uncertainties of the set-up.",
-        result.readings + result.outliers.len(),
-        result.outliers.len(),
+        result.model.readings + result.model.outliers.len(),
+        result.model.outliers.len(),
     )
 }

@@ -11,7 +11,7 @@ use abbe_files::stamp::FileStamp;
 use abbe_files::{ReadOptions, Source, SourceMap};
 use abbe_identify::IdentifyError;
 use abbe_identify::model_file;
-use abbe_identify::results::{FitResult, TraceResult};
+use abbe_identify::results::{FitResult, ModelResult, TraceResult};
 use abbe_model::document::{of_domain, print};
 use abbe_model::session::Session;
 use abbe_trace::SessionFit;
@@ -279,36 +279,31 @@ fn identify(
 }
 
 fn set_fit(record: &mut Record, fit: &FitResult) {
-    record.readings = Some(fit.readings);
-    record.outliers = Some(fit.outliers.len());
-    record.noise_um = Some(fit.noise_um);
-    record.noise_source = Some(fit.noise_source);
-    record.goodness = Some(fit.outcome.goodness.verdict);
-    record.rms_before_um = Some(fit.rms_um);
-    record.rms_um = Some(fit.rms_um);
-    record.heldout_rms_um = Some(fit.heldout_rms_um);
-    record.rank = Some(fit.rank);
-    record.parameter_count = Some(fit.parameter_count);
+    record.rms_before_um = Some(fit.model.rms_um);
     record.conflicts = Some(fit.plausibility.conflicts.len());
     record.conformity.clone_from(&fit.conformity);
     record.warnings.clone_from(&fit.warnings);
-    record.set_parameters(&fit.parameters, &fit.covariance, &fit.unobservable);
+    set_model(record, &fit.model);
 }
 
 fn set_trace(record: &mut Record, trace: &TraceResult) {
-    record.readings = Some(trace.readings);
-    record.outliers = Some(trace.outliers.len());
-    record.noise_um = Some(trace.noise_um);
-    record.noise_source = Some(trace.noise_source);
     record.verdict = Some(trace.verdict);
-    record.goodness = Some(trace.outcome.goodness.verdict);
     record.rms_before_um = Some(trace.before.rms_um);
-    record.rms_um = Some(trace.after.rms_um);
-    record.heldout_rms_um = Some(trace.after.heldout_rms_um);
-    record.rank = Some(trace.after.rank);
-    record.parameter_count = Some(trace.after.parameter_count);
     record.conflicts = Some(trace.plausibility.conflicts.len());
     record.conformity.clone_from(&trace.conformity);
     record.warnings.clone_from(&trace.warnings);
-    record.set_parameters(&trace.after.parameters, &trace.after.covariance, &trace.unobservable);
+    set_model(record, &trace.after);
+}
+
+fn set_model(record: &mut Record, model: &ModelResult) {
+    record.readings = Some(model.readings);
+    record.outliers = Some(model.outliers.len());
+    record.noise_um = Some(model.noise_um);
+    record.noise_source = Some(model.noise_source);
+    record.goodness = Some(model.outcome.goodness.verdict);
+    record.rms_um = Some(model.rms_um);
+    record.heldout_rms_um = Some(model.heldout_rms_um);
+    record.rank = Some(model.rank);
+    record.parameter_count = Some(model.parameter_count);
+    record.set_parameters(&model.parameters, &model.covariance, &model.unobservable);
 }

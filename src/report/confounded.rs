@@ -1,6 +1,6 @@
 //! What the readings leave open: null-space directions, and readings that are excluded.
 
-use abbe::identify::results::{DeterminedByPrior, Finding, Outlier, Unobservable};
+use abbe::identify::results::{DeterminedByPrior, Finding, ModelResult, Outlier, Unobservable};
 use abbe::identify::unit::ReadingUnit;
 use abbe::model::words::counted;
 
@@ -26,14 +26,11 @@ pub fn by_prior(errors: &[DeterminedByPrior]) -> Vec<String> {
 
 /// The section of null-space directions, of errors that set-up priors determine, and of outliers. One sentence where
 /// there is nothing.
-pub fn section(
-    report: &mut Report,
-    null_space: &[Unobservable],
-    prior: &[DeterminedByPrior],
-    (outliers, unit): (&[Outlier], ReadingUnit),
-) {
+pub fn section(report: &mut Report, model: &ModelResult) {
+    let ModelResult { unobservable, outliers, outcome, .. } = model;
+    let prior = &outcome.determined_by_prior;
     report.section("Confounded parameters and outliers");
-    match (null_space.is_empty() && prior.is_empty(), outliers.is_empty()) {
+    match (unobservable.is_empty() && prior.is_empty(), outliers.is_empty()) {
         (true, true) => report.key("No parameters are confounded. No reading is an outlier."),
         (true, false) => report.key("No parameters are confounded."),
         (false, _) => {}
@@ -54,13 +51,13 @@ pub fn section(
         (Finding::Weak, "Weakly determined", "combination", "it changes readings by less than their noise"),
     ];
     for (finding, word, noun, meaning) in groups {
-        let found: Vec<Unobservable> = null_space.iter().filter(|one| one.finding == finding).cloned().collect();
+        let found: Vec<Unobservable> = unobservable.iter().filter(|one| one.finding == finding).cloned().collect();
         if !found.is_empty() {
             let heading = format!("{word}: {} ({meaning})", counted(found.len(), noun));
             report.headed(Level::Key, heading, Text::List(sentences(&found)));
         }
     }
-    report.key(self::outliers(outliers, unit));
+    report.key(self::outliers(outliers, model.reading_unit));
 }
 
 /// The readings that are excluded as outliers; without `--all`, those with the largest residual.

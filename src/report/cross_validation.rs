@@ -1,6 +1,6 @@
 //! Held-out errors by what is held out, in words: interpolation and extrapolation of poses, left-out tests.
 
-use abbe::identify::results::CrossValidation;
+use abbe::identify::results::ModelResult;
 use abbe::identify::unit::ReadingUnit;
 use abbe::model::words::first_of;
 
@@ -34,12 +34,13 @@ impl HeldOutFigure {
 }
 
 /// The held-out errors of a model that it has.
-pub fn figures(model: &CrossValidation) -> Vec<HeldOutFigure> {
+pub fn figures(model: &ModelResult) -> Vec<HeldOutFigure> {
+    let found = &model.cross_validation;
     let all = [
-        ("extrapolation", model.extrapolation_rms_um, model.extrapolation_rms_3d_um),
-        ("interpolation", model.interpolation_rms_um, model.interpolation_rms_3d_um),
-        ("left-out run", model.left_out_run_rms_um, model.left_out_run_rms_3d_um),
-        ("left-out test", model.left_out_test_rms_um, model.left_out_test_rms_3d_um),
+        ("extrapolation", found.extrapolation_rms_um, found.extrapolation_rms_3d_um),
+        ("interpolation", found.interpolation_rms_um, found.interpolation_rms_3d_um),
+        ("left-out run", found.left_out_run_rms_um, found.left_out_run_rms_3d_um),
+        ("left-out test", found.left_out_test_rms_um, found.left_out_test_rms_3d_um),
     ];
     let present = all.into_iter().filter_map(|(name, rms_um, rms_3d_um)| {
         Some(HeldOutFigure { name, unit: model.reading_unit, rms_um: rms_um?, rms_3d_um })
@@ -48,7 +49,8 @@ pub fn figures(model: &CrossValidation) -> Vec<HeldOutFigure> {
 }
 
 /// The held-out errors that do not decide, one sentence each, compared with those of a first model if there is one.
-pub fn sentences(model: &CrossValidation, before: Option<&CrossValidation>) -> Vec<String> {
+pub fn sentences(model: &ModelResult, before: Option<&ModelResult>) -> Vec<String> {
+    let held_out = &model.cross_validation;
     let earlier = before.map(figures).unwrap_or_default();
     let mut sentences = Vec::new();
     for figure in figures(model) {
@@ -57,20 +59,20 @@ pub fn sentences(model: &CrossValidation, before: Option<&CrossValidation>) -> V
             None => figure.in_words(),
         };
         match figure.name {
-            "interpolation" if model.extrapolation_rms_um.is_some() => {
+            "interpolation" if held_out.extrapolation_rms_um.is_some() => {
                 sentences.push(format!(
                     "held-out blocks test extrapolation, and decide; interpolation, over random poses: {value}"
                 ));
             }
             "left-out test" => {
-                let tests = first_of(&model.left_out_tests, MAX_NAMED, ", ", "");
+                let tests = first_of(&held_out.left_out_tests, MAX_NAMED, ", ", "");
                 sentences.push(format!("left-out test: {value} ({tests}, each predicted by the other tests)"));
             }
             _ => {}
         }
     }
-    if !model.tests_not_left_out.is_empty() {
-        let tests = model.tests_not_left_out.iter();
+    if !held_out.tests_not_left_out.is_empty() {
+        let tests = held_out.tests_not_left_out.iter();
         let tests = tests.map(|test| format!("{} (needs {})", test.test, test.parameters.join(", ")));
         sentences.push(format!(
             "not predicted by the other tests: {}",

@@ -228,7 +228,7 @@ fn convergence(trace: &TraceOutcome) -> Figure {
     let x = Scale::over([0.0, if shown { 1.5 * steps } else { steps + 0.5 }], 10);
     let mut series =
         vec![Series { names: names.collect(), ..Series::new("held-out rms", "after", Mark::Line, points) }];
-    let noise = trace.result.noise_um;
+    let noise = trace.result.after.noise_um;
     if noise < maximum {
         let level = x.values.map(|at| (at, noise)).to_vec();
         series.push(Series::new("noise of a reading", "found-line", Mark::Line, level));

@@ -5,7 +5,7 @@ use abbe::identify::IdentifyError;
 use abbe::identify::circular::CircularTest;
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
-use abbe::identify::results::{CrossValidation, FitMonteCarlo, FitResult, NextStep, ParameterResult, Verdict};
+use abbe::identify::results::{FitMonteCarlo, FitResult, ModelResult, NextStep, ParameterResult, Verdict};
 use abbe::identify::series::{spectrum, views};
 use abbe::identify::statements::has_candidates;
 use abbe::identify::tolerance::Conformity;
@@ -15,7 +15,7 @@ use super::block::{Level, Report, Sentence, Text};
 use super::commands::Commands;
 use super::number::{fixed, places, unit};
 use super::parameters::Estimates;
-use super::quality::{self, Quality, noise, noise_sentence};
+use super::quality;
 use super::session::plots::SessionPlots;
 use super::session::{self, residuals};
 use super::statements::{self, IDENTIFIES, IMPROVES};
@@ -36,31 +36,29 @@ pub fn report(
     figures: bool,
 ) -> Result<Report, IdentifyError> {
     let (result, statements) = (stated.result, &stated.statements);
+    let model = &result.model;
     let mut report = Report::new(format!("Fit of {}", problem.session.machine.name));
     report.warnings.clone_from(&result.warnings);
-    report.method = method(result);
-    let opening = statements::opening(statements, &problem.session, result.degrees_of_freedom, commands);
-    let rank = rank(result.identifiable.len(), result.parameter_count, result.rank);
-    let noise = noise(result.noise_um, result.reading_unit, result.noise_source);
-    let along_runs = quality::autocorrelated(&result.noise_ar_coefficients);
-    let extent = format!("{}, {noise}{along_runs}; {rank}.", counted(result.readings, "reading"));
+    report.method = method(model);
+    let opening = statements::opening(statements, &problem.session, model.degrees_of_freedom, commands);
+    let noise = quality::noise_of_model(model);
+    let extent = format!("{}, {noise}; {}.", counted(model.readings, "reading"), rank(model));
     let failed = conformity::failed(result.conformity.as_ref());
     let contradicted = plausibility::headline(&result.plausibility);
     report
         .opening("", contradicted.into_iter().chain(failed).map(Sentence::from).chain(opening).chain([extent.into()]));
     report.values = Figures::of_fit(result);
-    let quality = quality(result);
-    let mut figures_of_quality = quality.key_figures(None);
-    figures_of_quality.push(quality::readings(problem, result.readings, result.outliers.len()));
+    let mut figures_of_quality = quality::key_figures(model, None);
+    figures_of_quality.push(quality::readings(problem, model));
     report.key(figures_of_quality);
     plausibility::section(&mut report, &result.plausibility);
-    let estimates = Estimates::new(problem, fit, &result.parameters);
+    let estimates = Estimates::new(problem, fit, &model.parameters);
     report.section("Values");
     if let Some(drawn) = &result.monte_carlo {
         report.key(propagations(drawn, |id| estimates.is_setup(id)));
         report.key(agreement_of_propagations(drawn));
     }
-    estimates.errors(&mut report, result.outcome.goodness, None);
+    estimates.errors(&mut report, model.outcome.goodness, None);
     if let Some(base) = &result.base {
         report.headed(Level::Key, "Base parameters", base::base_parameters(base));
         report.key(base::base_statement(base));
@@ -72,8 +70,7 @@ pub fn report(
     report.detail(statements::corrections(statements));
     estimates.set_up(&mut report, None);
     conformity::section(&mut report, result.conformity.as_ref());
-    let by_prior = &result.outcome.determined_by_prior;
-    confounded::section(&mut report, &result.unobservable, by_prior, (&result.outliers, result.reading_unit));
+    confounded::section(&mut report, model);
     circular::section(&mut report, &result.circular);
     positioning::section(&mut report, &result.positioning);
     positioning::diagonals(&mut report, &result.diagonals, &result.largest_of_diagonals);
@@ -83,7 +80,7 @@ pub fn report(
     let page = commands.command("fit", "--report fit.html");
     report.steps(steps, (page, "write residuals, plots and sliders as a page"));
     report.section("Residuals");
-    report.detail(Text::List(quality.held_out_sentences(None)));
+    report.detail(Text::List(quality::held_out_sentences(model, None)));
     if !figures {
         return Ok(report);
     }
@@ -91,40 +88,20 @@ pub fn report(
     let plots = SessionPlots::new(problem, &series);
     let before = if plots.is_polar() { "nominal machine and set-up" } else { "nominal machine, fitted set-up" };
     residuals::figures(&mut report, &plots, &spectrum::spectra(problem, &series), [before, "fit"]);
-    session::add_data(&mut report, &plots, &result.parameters);
+    session::add_data(&mut report, &plots, &model.parameters);
     session::traces(&mut report, &plots);
     session::correlations(&mut report, problem, fit);
     session::model(&mut report, problem, &fit.beta)?;
     Ok(report)
 }
 
-fn quality(result: &FitResult) -> Quality<'_> {
-    Quality {
-        unit: result.reading_unit,
-        of_angles: result.of_angles,
-        chi_square: result.chi_square,
-        degrees_of_freedom: result.degrees_of_freedom,
-        rms_um: result.rms_um,
-        rms_3d_um: result.rms_3d_um,
-        heldout_rms_um: result.heldout_rms_um,
-        heldout_rms_3d_um: result.heldout_rms_3d_um,
-        cross_validation: &result.cross_validation,
-        heldout_by: &result.heldout_by,
-        rank: result.rank,
-        parameters: result.parameter_count,
-        noise_um: result.noise_um,
-        noise_source: result.noise_source,
-    }
-}
-
-fn method(result: &FitResult) -> String {
+fn method(model: &ModelResult) -> String {
     format!(
         "Least squares on the kinematic chain. All parameters are estimated together in the identifiable subspace. The \
-         covariance follows from the law of propagation of uncertainty (JCGM 100, JCGM 102). {}{}. Held-out error: each \
+         covariance follows from the law of propagation of uncertainty (JCGM 100, JCGM 102). {}. Held-out error: each \
          fold leaves out {}.",
-        noise_sentence(result.noise_um, result.reading_unit, result.noise_source),
-        quality::autocorrelated(&result.noise_ar_coefficients),
-        result.heldout_by
+        quality::noise_sentence_of_model(model),
+        model.heldout_by
     )
 }
 
@@ -134,7 +111,12 @@ fn next(problem: &Problem, result: &FitResult, step: NextStep, commands: &Comman
     let mut add = |step: String, purpose: &str| steps.push((step, purpose.to_string()));
     let test = |purpose: &str| format!("propose the test that {purpose}");
     match step {
-        NextStep::CorrectSession => add("correct the session".into(), "remove what the readings contradict"),
+        NextStep::CorrectSession => {
+            add("correct the session".into(), "remove what the readings contradict");
+            if result.model.outcome.goodness.verdict.lacks_an_effect() {
+                add(commands.command("trace", ""), "or find an effect that explains the contradiction");
+            }
+        }
         NextStep::StateNoise => {
             add(format!("state {} or repeat a run", problem.session.keys_of_noise()), "have χ² judge the model");
         }
@@ -146,15 +128,16 @@ fn next(problem: &Problem, result: &FitResult, step: NextStep, commands: &Comman
     if matches!(step, NextStep::Trace | NextStep::StateNoise) {
         add(commands.command("trace", ""), "find the unmodelled effect behind the residual");
     }
-    if !result.unobservable.is_empty() && (step == NextStep::NoneHelps || !has_candidates(problem)) {
+    if !result.model.unobservable.is_empty() && (step == NextStep::NoneHelps || !has_candidates(problem)) {
         add("measure a further test".into(), "move axes that these tests leave at rest");
     }
     steps
 }
 
-/// `identifiable` of `count` parameters, and the rank.
-pub fn rank(identifiable: usize, count: usize, rank: usize) -> String {
-    format!("{identifiable} of {} identifiable (numerical rank {rank})", counted(count, "parameter"))
+/// How many parameters are identifiable, and the rank.
+pub fn rank(model: &ModelResult) -> String {
+    let ModelResult { identifiable, parameter_count, rank, .. } = model;
+    format!("{} of {} identifiable (numerical rank {rank})", identifiable.len(), counted(*parameter_count, "parameter"))
 }
 
 /// Both propagations side by side, with the quoted interval; without `--all`, of the parameters that are no set-up.
@@ -210,17 +193,17 @@ impl Figures {
     /// The figures of a fit.
     fn of_fit(result: &FitResult) -> Table {
         let mut figures = Figures::default();
-        figures.figure("residual", "rms", "", result.rms_um, result.reading_unit.name());
-        figures.held_out("residual", result.heldout_rms_um, &result.cross_validation);
-        figures.parameters("parameters", &result.parameters);
+        figures.residual("residual", &result.model);
+        figures.parameters("parameters", &result.model.parameters);
         result.circular.iter().for_each(|test| figures.circular(test));
         figures.conformity(result.conformity.as_ref());
         figures.0
     }
 
-    /// The deciding held-out error, and those by what is held out.
-    pub fn held_out(&mut self, section: &str, rms_um: f64, model: &CrossValidation) {
-        self.figure(section, "held out", "", rms_um, model.reading_unit.name());
+    /// The residual, the deciding held-out error, and those by what is held out.
+    pub fn residual(&mut self, section: &str, model: &ModelResult) {
+        self.figure(section, "rms", "", model.rms_um, model.reading_unit.name());
+        self.figure(section, "held out", "", model.heldout_rms_um, model.reading_unit.name());
         for figure in cross_validation::figures(model) {
             self.figure(section, figure.name, "", figure.rms_um, figure.unit.name());
         }

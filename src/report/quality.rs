@@ -2,7 +2,7 @@
 
 use abbe::identify::noise::NoiseSource;
 use abbe::identify::problem::Problem;
-use abbe::identify::results::{CrossValidation, Goodness, GoodnessVerdict, NotJudged, OfAngles};
+use abbe::identify::results::{Goodness, GoodnessVerdict, ModelResult, NotJudged};
 use abbe::identify::unit::ReadingUnit;
 use abbe::model::words::counted;
 
@@ -10,120 +10,64 @@ use super::block::KeyFigure;
 use super::cross_validation;
 use super::number::{integer, of_readings, three_digits};
 
-/// The quantities that describe the quality of one model.
-pub struct Quality<'r> {
-    /// The unit of the figures of readings.
-    pub unit: ReadingUnit,
-    /// The figures of the angles beside lengths.
-    pub of_angles: Option<OfAngles>,
-    /// χ², priors included.
-    pub chi_square: f64,
-    /// Degrees of freedom ν.
-    pub degrees_of_freedom: usize,
-    /// RMS residual over scalar readings, µm.
-    pub rms_um: f64,
-    /// RMS length of the residual vector, µm.
-    pub rms_3d_um: Option<f64>,
-    /// Held-out RMS residual over scalar readings, µm.
-    pub heldout_rms_um: f64,
-    /// Held-out RMS length of the residual vector, µm.
-    pub heldout_rms_3d_um: Option<f64>,
-    /// Held-out errors by what is held out.
-    pub cross_validation: &'r CrossValidation,
-    /// What each fold holds out.
-    pub heldout_by: &'r str,
-    /// Numerical rank.
-    pub rank: usize,
-    /// Number of parameters.
-    pub parameters: usize,
-    /// Noise standard deviation of one scalar reading, µm.
-    pub noise_um: f64,
-    /// Source of the noise.
-    pub noise_source: NoiseSource,
+/// χ²/ν; a dash without degrees of freedom.
+fn ratio(model: &ModelResult) -> String {
+    match model.degrees_of_freedom {
+        0 => "–".to_string(),
+        freedom => format!("{:.2}", model.chi_square / freedom as f64),
+    }
 }
 
-impl Quality<'_> {
-    /// Whether the noise is known independently of the residual, so that χ²/ν is a test of the model.
-    pub fn is_testable(&self) -> bool {
-        self.noise_source.judges()
+/// The key figures of a model, compared with those of the declared one if there is one.
+pub fn key_figures(model: &ModelResult, before: Option<&ModelResult>) -> Vec<KeyFigure> {
+    let shown = |value: f64| of_readings(value, model.reading_unit);
+    let than = |figure: &dyn Fn(&ModelResult) -> String| before.map(|before| format!("before {}", figure(before)));
+    let and = |before: Option<String>| before.map_or(String::new(), |before| before + "; ");
+    let judges = model.noise_source.judges();
+    let chi_square = match judges {
+        true => KeyFigure::new("χ²/ν", ratio(model), and(than(&ratio)) + "expected 1"),
+        false => KeyFigure::new("χ²/ν", "not testable", "the residual is taken for noise"),
+    };
+    let noise = match judges {
+        true => noise(model.noise_um, model.reading_unit, model.noise_source),
+        false => "noise not stated".to_string(),
+    };
+    let held_out = than(&|before| shown(before.heldout_rms_um)).unwrap_or_else(|| "cross-validation".to_string());
+    let mut figures = vec![
+        chi_square,
+        KeyFigure::new("Residual rms", shown(model.rms_um), and(than(&|before| shown(before.rms_um))) + &noise),
+        KeyFigure::new("Held-out rms", shown(model.heldout_rms_um), held_out),
+    ];
+    if let (Some(rms), Some(held)) = (model.rms_3d_um, model.heldout_rms_3d_um) {
+        figures.push(KeyFigure::new("3-vector", shown(rms), format!("held out {}", shown(held))));
     }
+    if let Some(angles) = model.of_angles {
+        let in_arcsec = |value: f64| of_readings(value, ReadingUnit::Arcsecond);
+        let [rms, held, noise] = [angles.rms_arcsec, angles.heldout_rms_arcsec, angles.noise_arcsec].map(in_arcsec);
+        figures.push(KeyFigure::new("Angles, rms", rms, format!("held out {held}, noise {noise}")));
+    }
+    let open = match model.parameter_count.saturating_sub(model.rank) {
+        0 => "all parameters identifiable".to_string(),
+        deficit => format!("{} not identifiable", counted(deficit, "combination")),
+    };
+    figures.push(KeyFigure::new("Rank", format!("{} of {}", model.rank, model.parameter_count), open));
+    figures
+}
 
-    /// A figure of readings with its unit.
-    fn shown(&self, value: f64) -> String {
-        of_readings(value, self.unit)
-    }
-
-    /// χ²/ν; a dash without degrees of freedom.
-    fn ratio(&self) -> String {
-        match self.degrees_of_freedom {
-            0 => "–".to_string(),
-            freedom => format!("{:.2}", self.chi_square / freedom as f64),
-        }
-    }
-
-    fn chi_square(&self, before: Option<&Quality<'_>>) -> KeyFigure {
-        if !self.is_testable() {
-            return KeyFigure::new("χ²/ν", "not testable", "the residual is taken for noise");
-        }
-        let before = before.map_or(String::new(), |before| format!("before {}; ", before.ratio()));
-        KeyFigure::new("χ²/ν", self.ratio(), format!("{before}expected 1"))
-    }
-
-    fn residual(&self, before: Option<&Quality<'_>>) -> KeyFigure {
-        let noise = match self.is_testable() {
-            true => noise(self.noise_um, self.unit, self.noise_source),
-            false => "noise not stated".to_string(),
-        };
-        let before = before.map_or(String::new(), |before| format!("before {}; ", self.shown(before.rms_um)));
-        KeyFigure::new("Residual rms", self.shown(self.rms_um), format!("{before}{noise}"))
-    }
-
-    fn held_out(&self, before: Option<&Quality<'_>>) -> KeyFigure {
-        let note = match before {
-            Some(before) => format!("before {}", self.shown(before.heldout_rms_um)),
-            None => "cross-validation".to_string(),
-        };
-        KeyFigure::new("Held-out rms", self.shown(self.heldout_rms_um), note)
-    }
-
-    fn rank(&self) -> KeyFigure {
-        let note = match self.parameters.saturating_sub(self.rank) {
-            0 => "all parameters identifiable".to_string(),
-            deficit => format!("{} not identifiable", counted(deficit, "combination")),
-        };
-        KeyFigure::new("Rank", format!("{} of {}", self.rank, self.parameters), note)
-    }
-
-    /// The key figures, compared with those of a first model if there is one.
-    pub fn key_figures(&self, before: Option<&Quality<'_>>) -> Vec<KeyFigure> {
-        let mut figures = vec![self.chi_square(before), self.residual(before), self.held_out(before)];
-        if let (Some(rms), Some(held)) = (self.rms_3d_um, self.heldout_rms_3d_um) {
-            figures.push(KeyFigure::new("3-vector", self.shown(rms), format!("held out {}", self.shown(held))));
-        }
-        if let Some(angles) = self.of_angles {
-            let in_arcsec = |value: f64| of_readings(value, ReadingUnit::Arcsecond);
-            let [rms, held, noise] = [angles.rms_arcsec, angles.heldout_rms_arcsec, angles.noise_arcsec].map(in_arcsec);
-            figures.push(KeyFigure::new("Angles, rms", rms, format!("held out {held}, noise {noise}")));
-        }
-        figures.push(self.rank());
-        figures
-    }
-
-    /// What is held out, and the held-out errors that do not decide.
-    pub fn held_out_sentences(&self, before: Option<&Quality<'_>>) -> Vec<String> {
-        let others = cross_validation::sentences(self.cross_validation, before.map(|before| before.cross_validation));
-        std::iter::once(format!("held out: leaving out {}", self.heldout_by)).chain(others).collect()
-    }
+/// What is held out, and the held-out errors that do not decide.
+pub fn held_out_sentences(model: &ModelResult, before: Option<&ModelResult>) -> Vec<String> {
+    let others = cross_validation::sentences(model, before);
+    std::iter::once(format!("held out: leaving out {}", model.heldout_by)).chain(others).collect()
 }
 
 /// Number of readings, tests and outliers.
-pub fn readings(problem: &Problem, readings: usize, outliers: usize) -> KeyFigure {
+pub fn readings(problem: &Problem, model: &ModelResult) -> KeyFigure {
     let tests = counted(problem.tests.len(), "test");
-    let excluded = match outliers {
+    let excluded = match model.outliers.len() {
         0 => "no outliers".to_string(),
         some => format!("{} excluded", counted(some, "outlier")),
     };
-    KeyFigure::new("Readings", integer(readings), format!("{tests}, {excluded}"))
+    KeyFigure::new("Readings", integer(model.readings), format!("{tests}, {excluded}"))
 }
 
 /// How far a chosen design is from the best one, by its bound.
@@ -147,9 +91,18 @@ pub fn noise(noise_um: f64, unit: ReadingUnit, source: NoiseSource) -> String {
     }
 }
 
-/// What follows the noise if the readings of a run are correlated.
-pub fn autocorrelated(coefficients: &[f64]) -> &'static str {
-    if coefficients.is_empty() { "" } else { ", autocorrelated along runs" }
+/// The noise of a model and its source in words, and whether the readings of a run are correlated.
+pub fn noise_of_model(model: &ModelResult) -> String {
+    noise(model.noise_um, model.reading_unit, model.noise_source) + autocorrelated(model)
+}
+
+/// The same as a sentence, without its full stop.
+pub fn noise_sentence_of_model(model: &ModelResult) -> String {
+    noise_sentence(model.noise_um, model.reading_unit, model.noise_source) + autocorrelated(model)
+}
+
+fn autocorrelated(model: &ModelResult) -> &'static str {
+    if model.noise_ar_coefficients.is_empty() { "" } else { ", autocorrelated along runs" }
 }
 
 /// The noise of a result and its source. The residual of a model is not called noise.
@@ -172,7 +125,7 @@ pub fn agreement(goodness: Goodness, degrees_of_freedom: usize) -> String {
                 format!("not judged: the residual is far below the noise ({figures}), so the noise is overstated")
             }
             Some(NotJudged::WrongUnit) => {
-                "not judged: the residual is less than a tenth of the noise; the unit of the readings is the likely cause"
+                "not judged: less than a tenth of the noise, or no size of such an instrument; the unit of the readings is the likely cause"
                     .to_string()
             }
             Some(NotJudged::NoDegreesOfFreedom) => {
@@ -196,9 +149,9 @@ pub fn agreement(goodness: Goodness, degrees_of_freedom: usize) -> String {
 /// What the estimates of a model are not good for; `None` if they may be quoted.
 pub fn reservation(goodness: Goodness) -> Option<&'static str> {
     (!goodness.quotable).then_some(match goodness.not_judged {
-        Some(NotJudged::WrongUnit) => {
-            "not to be quoted: the residual is less than a tenth of the noise, so that the unit of the readings is in doubt"
+        Some(NotJudged::WrongUnit) => "not to be quoted: the unit of the readings is in doubt",
+        _ => {
+            "not to be quoted: the model lacks an effect, and u does not cover the bias that it causes in the estimates"
         }
-        _ => "not to be quoted: the model lacks an effect, and u does not cover the bias that it causes in the estimates",
     })
 }

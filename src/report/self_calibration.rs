@@ -1,6 +1,6 @@
 //! A self-calibration: its functions, the position of the axis, coverage intervals.
 
-use abbe::identify::results::Interval;
+use abbe::identify::results::{Interval, ModelResult};
 use abbe::identify::self_calibration::{FunctionResult, MonteCarloResult, SelfCalibration};
 use abbe::identify::unit::ReadingUnit;
 use abbe::model::session::Session;
@@ -57,7 +57,8 @@ pub fn report(session: &Session, result: &SelfCalibration) -> Report {
     if !result.parameters.is_empty() {
         report.key(functions(&result.error_motions).titled(format!("Error motions of axis {axis}, µm")));
     }
-    confounded::section(&mut report, &result.unobservable, &[], (&[], ReadingUnit::Micrometre));
+    let unobservable = result.unobservable.clone();
+    confounded::section(&mut report, &ModelResult { unobservable, ..ModelResult::default() });
     if let Some(drawn) = &result.monte_carlo {
         report.section("Monte Carlo");
         report.key(intervals(drawn).titled(format!(

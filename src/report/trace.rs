@@ -17,12 +17,12 @@ use super::effect::name;
 use super::fit::{Figures, rank};
 use super::number::{capitalised, integer, of_readings, p_value, quantity, unit, value_and_u};
 use super::parameters::Estimates;
-use super::quality::{self, Quality, noise_sentence};
+use super::quality;
 use super::session::plots::SessionPlots;
 use super::session::{self, residuals};
 use super::statements::{self, IDENTIFIES};
 use super::table::{Cell, Table, cells, numbers, words};
-use super::{conformity, confounded, cross_validation, effects, plausibility, uniqueness};
+use super::{conformity, confounded, effects, plausibility, uniqueness};
 
 /// Effects that the opening names.
 const MAX_NAMED: usize = 3;
@@ -52,7 +52,7 @@ pub fn report(
     sentences.push(
         format!(
             "{}, {}; {} of {} detectable.",
-            counted(result.readings, "reading"),
+            counted(result.after.readings, "reading"),
             noise(result, &problem.session),
             result.candidates_detectable,
             counted(result.candidates, "candidate")
@@ -60,13 +60,12 @@ pub fn report(
         .into(),
     );
     report.opening(result.verdict.to_string(), sentences);
-    let [before, after] = [&result.before, &result.after].map(|model| quality(result, model));
-    report.key(key_figures(trace, &before, &after));
+    report.key(key_figures(trace));
     plausibility::section(&mut report, &result.plausibility);
     let estimates = Estimates::new(problem, &trace.after_fit, &result.after.parameters);
     let earlier = (!result.effects.is_empty()).then_some(result.before.parameters.as_slice());
     report.section("Values");
-    estimates.errors(&mut report, result.outcome.goodness, earlier);
+    estimates.errors(&mut report, result.after.outcome.goodness, earlier);
     if result.after.parameters.iter().any(|parameter| !parameter.enlarged_by.is_empty()) {
         let covers = "u covers the change of the parameter if an alias takes the place of an effect";
         report.key(Text::Note(covers.to_string()));
@@ -82,8 +81,7 @@ pub fn report(
     report.key(format!("Residual of the declared model: {}", result.residual_before));
     report.key(before_and_after(result));
     conformity::section(&mut report, result.conformity.as_ref());
-    let by_prior = &result.outcome.determined_by_prior;
-    confounded::section(&mut report, &result.unobservable, by_prior, (&result.outliers, result.reading_unit));
+    confounded::section(&mut report, &result.after);
     let presumed = "Location errors that rest on the absence of a motion, which no reading separates from them:";
     report.headed(Level::Detail, presumed, Text::List(result.presumed.clone()));
     report.section("Next");
@@ -112,13 +110,12 @@ fn method(result: &TraceResult) -> String {
     format!(
         "The search screens {} candidate effects of the library against the residual of the declared model. {} of them \
          are detectable in these readings. An effect is added if the same search rarely finds an effect as good in \
-         readings without structure. All parameters are then refitted together. {}{}. Held-out error: each fold leaves \
+         readings without structure. All parameters are then refitted together. {}. Held-out error: each fold leaves \
          out {}; the search is repeated in each fold.",
         integer(result.candidates),
         integer(result.candidates_detectable),
-        noise_sentence(result.noise_um, result.reading_unit, result.noise_source),
-        quality::autocorrelated(&result.noise_ar_coefficients),
-        result.heldout_by
+        quality::noise_sentence_of_model(&result.after),
+        result.after.heldout_by
     )
 }
 
@@ -147,9 +144,9 @@ fn verdict(result: &TraceResult) -> String {
                 0 => "The search finds no effect.".to_string(),
                 _ => format!("{subject} a part of the residual of the declared model: {found}."),
             },
-            match result.outcome.goodness.not_judged {
+            match result.after.outcome.goodness.not_judged {
                 Some(NotJudged::BelowNoise) => "The residual is far below the noise",
-                Some(NotJudged::WrongUnit) => "The residual is less than a tenth of the stated noise",
+                Some(NotJudged::WrongUnit) => "The unit of the readings is in doubt",
                 Some(NotJudged::NoDegreesOfFreedom) => "The parameters are as many as the readings",
                 Some(NotJudged::NoNoise) | None => "No noise is stated or follows from repeats",
             }
@@ -160,7 +157,7 @@ fn verdict(result: &TraceResult) -> String {
 
 /// What remains of the residual.
 fn remains(result: &TraceResult) -> &'static str {
-    match result.outcome.goodness.verdict {
+    match result.after.outcome.goodness.verdict {
         GoodnessVerdict::Exceeds if !result.remainder.structured => {
             "The residual exceeds the noise: the model lacks an effect, and its estimates are not to be quoted."
         }
@@ -168,39 +165,24 @@ fn remains(result: &TraceResult) -> &'static str {
     }
 }
 
-/// The first effects with their values, and the number of the others.
+/// The effects that explain most with their values, and the number of the others.
 fn named(found: &[EffectResult]) -> String {
-    let one = |effect: &EffectResult| format!("{}, {}", effect.name.meaning, effects::estimate(effect));
-    let mut named: Vec<String> = found.iter().take(MAX_NAMED).map(one).collect();
+    let one = |effect: &&EffectResult| match effects::estimate(effect) {
+        value if value.is_empty() => effect.name.meaning.clone(),
+        value => format!("{}, {value}", effect.name.meaning),
+    };
+    let mut ranked: Vec<&EffectResult> = found.iter().collect();
+    ranked.sort_by(|a, b| b.rms_gain_um.total_cmp(&a.rms_gain_um));
+    let mut named: Vec<String> = ranked.iter().take(MAX_NAMED).map(one).collect();
     if found.len() > MAX_NAMED {
         named.push(format!("{} more", found.len() - MAX_NAMED));
     }
     named.join("; ")
 }
 
-/// Quality of a model of a trace.
-fn quality<'r>(result: &'r TraceResult, model: &'r ModelResult) -> Quality<'r> {
-    Quality {
-        unit: result.reading_unit,
-        of_angles: model.of_angles,
-        chi_square: model.chi_square,
-        degrees_of_freedom: model.degrees_of_freedom,
-        rms_um: model.rms_um,
-        rms_3d_um: model.rms_3d_um,
-        heldout_rms_um: model.heldout_rms_um,
-        heldout_rms_3d_um: model.heldout_rms_3d_um,
-        cross_validation: &model.cross_validation,
-        heldout_by: &result.heldout_by,
-        rank: model.rank,
-        parameters: model.parameter_count,
-        noise_um: model.noise_um,
-        noise_source: result.noise_source,
-    }
-}
-
-fn key_figures(trace: &TraceOutcome, before: &Quality<'_>, after: &Quality<'_>) -> Vec<KeyFigure> {
+fn key_figures(trace: &TraceOutcome) -> Vec<KeyFigure> {
     let result = &trace.result;
-    let mut figures = after.key_figures(Some(before));
+    let mut figures = quality::key_figures(&result.after, Some(&result.before));
     let unique = result.effects.iter().filter(|effect| effect.unique).count();
     match result.effects.as_slice() {
         [] => {}
@@ -215,7 +197,7 @@ fn key_figures(trace: &TraceOutcome, before: &Quality<'_>, after: &Quality<'_>) 
     }
     let structure = if result.remainder.structured { "significant" } else { "not significant" };
     figures.push(KeyFigure::new("Remaining structure", structure, format!("p = {:.3}", result.remainder.p_value)));
-    figures.push(quality::readings(&trace.after, result.readings, result.outliers.len()));
+    figures.push(quality::readings(&trace.after, &result.after));
     figures
 }
 
@@ -250,14 +232,13 @@ fn next(result: &TraceResult, measure: NextStep, commands: &Commands) -> Vec<(St
 /// The noise and its source in words. A residual is not called noise. Many repeats, or a few that contradict it, take the place
 /// of a stated noise in a trace, and not in a fit.
 fn noise(result: &TraceResult, session: &Session) -> String {
-    if result.noise_source.judges() || result.effects.is_empty() {
+    if result.after.noise_source.judges() || result.effects.is_empty() {
         let stated_um = session.stated_noise_mm().map(|mm| mm * 1e3).filter(|_| result.reading_unit.is_micrometre());
-        let along_runs = quality::autocorrelated(&result.noise_ar_coefficients);
-        let stated = match (result.noise_source, stated_um) {
+        let stated = match (result.after.noise_source, stated_um) {
             (NoiseSource::Repeats, Some(um)) => format!("; stated {}", of_readings(um, result.reading_unit)),
             _ => String::new(),
         };
-        return quality::noise(result.noise_um, result.reading_unit, result.noise_source) + along_runs + &stated;
+        return quality::noise_of_model(&result.after) + &stated;
     }
     format!(
         "residual of the declared model {}, with the effects {} (no noise stated, no repeats)",
@@ -269,7 +250,7 @@ fn noise(result: &TraceResult, session: &Session) -> String {
 /// The residual of the declared model, and with the effects.
 pub fn before_and_after(result: &TraceResult) -> Table {
     // The residual itself is no measure of the noise.
-    let judges = result.noise_source.judges();
+    let judges = result.after.noise_source.judges();
     let row = |name: &str, model: &ModelResult| {
         let mut cells = cells![name, Cell::fixed(model.rms_um, 3), Cell::fixed(model.heldout_rms_um, 3)];
         if let (Some(rms), Some(held)) = (model.rms_3d_um, model.heldout_rms_3d_um) {
@@ -278,7 +259,7 @@ pub fn before_and_after(result: &TraceResult) -> Table {
         if judges {
             cells.push(Cell::fixed(model.chi_square / model.degrees_of_freedom.max(1) as f64, 2));
         }
-        cells.push(rank(model.identifiable.len(), model.parameter_count, model.rank).into());
+        cells.push(rank(model).into());
         cells
     };
     let residual = format!("residual, {}", unit(result.reading_unit.name()));
@@ -291,9 +272,7 @@ pub fn before_and_after(result: &TraceResult) -> Table {
     }
     columns.push(words(""));
     let mut table = Table::new(columns, [row("before", &result.before), row("after", &result.after)]);
-    table.notes.push(format!("held out: leaving out {}", result.heldout_by));
-    let (before, after) = (&result.before.cross_validation, &result.after.cross_validation);
-    table.notes.extend(cross_validation::sentences(after, Some(before)));
+    table.notes.extend(quality::held_out_sentences(&result.after, Some(&result.before)));
     table
 }
 
@@ -356,8 +335,7 @@ fn values(result: &TraceResult) -> Table {
         figures.statement("search", "interrupted", &format!("{}: the result is incomplete", result.interruption()));
     }
     for (name, model) in [("before", &result.before), ("after", &result.after)] {
-        figures.figure(name, "rms", "", model.rms_um, model.reading_unit.name());
-        figures.held_out(name, model.heldout_rms_um, &model.cross_validation);
+        figures.residual(name, model);
         figures.parameters(name, &model.parameters);
     }
     for (index, effect) in result.effects.iter().enumerate() {

@@ -174,10 +174,10 @@ fn a_fit_states_its_uncertainties_in_any_noise() {
         let (problem, fitted) = prepare(&read, 1).unwrap();
         let result = report(&problem, &fitted).unwrap();
         let pulls = draw.truth.piges().filter_map(|(id, value, _)| {
-            let parameter = result.parameters.iter().find(|parameter| parameter.id == id)?;
+            let parameter = result.model.parameters.iter().find(|parameter| parameter.id == id)?;
             Some((parameter.value - value) / parameter.u)
         });
-        (condition, result.outcome.goodness.verdict != GoodnessVerdict::Exceeds, pulls.collect())
+        (condition, result.model.outcome.goodness.verdict != GoodnessVerdict::Exceeds, pulls.collect())
     };
     let fits: Vec<(Condition, bool, Vec<f64>)> =
         (first..first + 3 * sessions()).into_par_iter().map(pulls_of).collect();

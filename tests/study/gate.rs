@@ -73,7 +73,7 @@ fn judged(number: usize) -> Judged {
         let fitted = SessionFit::of(&read, 1).unwrap().result;
         judged.complete |= matches!(traced.verdict, TraceVerdict::Clean | TraceVerdict::Explained);
         for (conformity, parameters) in
-            [(traced.conformity, &traced.after.parameters), (fitted.conformity, &fitted.parameters)]
+            [(traced.conformity, &traced.after.parameters), (fitted.conformity, &fitted.model.parameters)]
         {
             let decided = conformity.unwrap().items.iter().any(|item| item.decision != Decision::Undecided);
             let quoted = parameters.iter().any(|parameter| parameter.quotable);

@@ -73,7 +73,7 @@ impl Searched {
     fn is_honest(&self) -> bool {
         let result = &self.stated.result;
         result.verdict != TraceVerdict::Explained
-            || result.after.goodness.chi_square_ratio <= 1.3 && !result.remainder.structured
+            || result.after.outcome.goodness.chi_square_ratio <= 1.3 && !result.remainder.structured
     }
 
     fn summary(&self) -> String {

@@ -2,7 +2,7 @@
 
 use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::{Fit, prepare_with, refit};
-use abbe_identify::noise::NoiseSource;
+use abbe_identify::noise::{Noise, NoiseSource};
 use abbe_identify::problem::Problem;
 use abbe_model::effect::Effect;
 
@@ -48,7 +48,7 @@ impl RefittedModel {
         // residual of the declared model contains the effects and overstates the noise.
         let estimated: Vec<Effect> = effects.iter().cloned().map(Effect::with_estimated_numbers).collect();
         let (mut after, mut after_fit) = prepare_with(&problem.session, &estimated, options.seed)?;
-        if noise_is_from_search(problem, &after) {
+        if noise_is_from_search(&problem.noise, &after.noise) {
             after.noise = problem.noise.clone();
             after_fit = refit(&mut after, &after_fit)?;
         }
@@ -88,13 +88,30 @@ const SAME_NOISE: f64 = 0.1;
 
 /// Whether the noise of the search is not that of a fit: repeats contradict the stated noise, or beside waves that vary from
 /// run to run they give another standard deviation.
-pub(super) fn noise_is_from_search(search: &Problem, fit: &Problem) -> bool {
-    let (of_search, of_fit) = (&search.noise, &fit.noise);
+pub(super) fn noise_is_from_search(of_search: &Noise, of_fit: &Noise) -> bool {
     let of_one_size = (of_search.sigma_mm / of_fit.sigma_mm - 1.0).abs() < SAME_NOISE;
     match (of_search.source, of_fit.source) {
         (NoiseSource::Repeats, NoiseSource::Repeats) if !of_fit.ar_coefficients.is_empty() => false,
         (NoiseSource::Repeats, _) => !(of_search.ar_coefficients.is_empty() && of_one_size),
         _ => false,
+    }
+}
+
+/// The declared model with the stated noise, if the search has judged it by a noise of repeats that is about the same: it is
+/// then reported as a fit reports it.
+///
+/// # Errors
+/// If the iterations do not converge.
+pub(super) fn with_noise_of_fit(problem: &Problem, fit: &Fit) -> Result<Option<(Problem, Fit)>, IdentifyError> {
+    let stated = problem.session.stated_noise_mm().map(|stated_mm| Noise::white(stated_mm, NoiseSource::Stated));
+    match stated.filter(|stated| !noise_is_from_search(&problem.noise, stated)) {
+        Some(noise) if problem.noise.source == NoiseSource::Repeats => {
+            let mut problem = problem.clone();
+            problem.noise = Noise { inflation: problem.noise.inflation, ..noise };
+            let fit = refit(&mut problem, fit)?;
+            Ok(Some((problem, fit)))
+        }
+        _ => Ok(None),
     }
 }
 

@@ -3,7 +3,6 @@
 //! A decision about a limit needs a model that lacks nothing. χ² alone overlooks an effect that is small in each of many
 //! readings, so where limits are to be decided the residual is tested for structure too, by the test of the trace.
 
-use abbe_identify::circular;
 use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::{Fit, prepare, report};
 use abbe_identify::problem::Problem;
@@ -33,7 +32,7 @@ impl SessionFit {
     pub fn of(session: &Session, seed: u64) -> Result<SessionFit, IdentifyError> {
         let (problem, fit) = prepare(session, seed)?;
         let mut result = report(&problem, &fit)?;
-        if result.conformity.is_some() && result.outcome.goodness.forbids_decisions().is_none() {
+        if result.conformity.is_some() && result.model.outcome.goodness.forbids_decisions().is_none() {
             test_structure(&problem, &fit, &mut result, seed)?;
         }
         Ok(SessionFit { problem, fit, result })
@@ -41,7 +40,7 @@ impl SessionFit {
 
     /// The estimate of an identifiable parameter, such as `EX0C`, in its display unit.
     pub fn parameter(&self, id: &str) -> Option<&ParameterResult> {
-        self.result.parameters.iter().find(|parameter| parameter.id == id)
+        self.result.model.parameters.iter().find(|parameter| parameter.id == id)
     }
 
     /// The residuals of a test in µm: the coordinates of each reading together.
@@ -56,16 +55,10 @@ fn test_structure(problem: &Problem, fit: &Fit, result: &mut FitResult, seed: u6
     let Some(structure) = structure_of_fit(problem, fit, seed)?.filter(|found| found.is_significant()) else {
         return Ok(());
     };
-    let goodness = result.outcome.goodness.with_structure(true);
-    result.outcome.goodness = goodness;
-    result.parameters.iter_mut().for_each(|parameter| parameter.quotable &= goodness.quotable);
-    result.conformity = conformity(
-        &problem.session,
-        &result.parameters,
-        &circular::of_session(&problem.session, problem.noise.sigma_mm, &problem.rejected),
-        result.noise_um,
-        goodness,
-    );
+    let goodness = result.model.outcome.goodness.with_structure(true);
+    result.model.outcome.goodness = goodness;
+    result.model.parameters.iter_mut().for_each(|parameter| parameter.quotable &= goodness.quotable);
+    result.conformity = conformity(&problem.session, &result.model, &result.circular);
     result.warnings.push(format!(
         "the residual has structure that the model does not explain: {}; trace it to find the effect",
         structure.description

@@ -126,10 +126,9 @@ pub fn trace(
     };
     progress(Progress::Fitting);
     let mut found = without_conformity(session, options, progress)?;
-    let (after, noise_um) = (&found.after, found.result.noise_um);
-    let goodness = found.result.outcome.goodness;
+    let after = &found.after;
     let circular = circular::of_session(&after.session, after.noise.sigma_mm, &after.rejected);
-    found.result.conformity = conformity(&after.session, &found.result.after.parameters, &circular, noise_um, goodness);
+    found.result.conformity = conformity(&after.session, &found.result.after, &circular);
     Ok(found)
 }
 

@@ -142,9 +142,9 @@ fn a_stated_scale_is_used_and_an_estimated_one_is_that_of_the_family() {
     let of = |session: &Session| {
         let found = SessionFit::of(session, 1).unwrap();
         let result = report(&found.problem, &found.fit).unwrap();
-        assert!(result.parameters.iter().any(|p| p.id == "EBJ2~J2:spectrum.rms" && p.u > 0.0));
-        assert!(!result.parameters.iter().any(|p| p.id.contains(".cos")));
-        result.rms_um
+        assert!(result.model.parameters.iter().any(|p| p.id == "EBJ2~J2:spectrum.rms" && p.u > 0.0));
+        assert!(!result.model.parameters.iter().any(|p| p.id.contains(".cos")));
+        result.model.rms_um
     };
     // Far too small a scale leaves the error in the residual; the estimated one does not. The errors of the other joints
     // remain.

@@ -46,7 +46,7 @@ pub use positions::StepPosition;
 pub use prepare::{NearMinimum, prepare, prepare_with, refit, with_families_linearised, with_lever};
 pub(crate) use quantities::{Quantity, quantities, values_at};
 pub(crate) use reported::parameters_of_noise;
-pub use reported::{ids, outliers, parameters, report, rms_of_units, unobservable};
+pub use reported::{JudgedBy, model, outliers, parameters, report, unobservable};
 
 /// The result of a fit, in internal units.
 #[derive(Clone, Debug)]
@@ -257,7 +257,8 @@ fn named(problem: &Problem, rank: &Rank, error: IdentifyError) -> IdentifyError 
 
 /// Degrees of freedom of χ². Each prior counts as an observation.
 fn freedom(problem: &Problem, rank: &Rank) -> usize {
-    (problem.scalars() + problem.prior_rows()).saturating_sub(rank.identifiable_basis.ncols())
+    let determined = rank.identifiable_basis.ncols() + problem.parameters.positions().count();
+    (problem.scalars() + problem.prior_rows()).saturating_sub(determined)
 }
 
 /// The rank at the nominal machine, and the parameters and triangular factors of its linearisation. The priors of

@@ -1,14 +1,15 @@
 //! What a fit is worth: its residual against the noise, what determines its estimates, what it assumes.
 
 use abbe_model::axis::AxisKind;
-use abbe_model::session::Prior;
+use abbe_model::instrument::Checked;
+use abbe_model::session::{Prior, Test};
 use abbe_model::words::counted;
 
 use super::{BIRGE_SIGNIFICANCE, Fit, assume};
 use crate::error::IdentifyError;
 use crate::identifiability::determined_by_prior;
 use crate::linear::{Linearisation, is_of_interest};
-use crate::noise::NoiseSource;
+use crate::noise::{NoiseSource, stated_against_repeats};
 use crate::numerics::rank::Rank;
 use crate::numerics::tails::chi_square_tails;
 use crate::parameters::Role;
@@ -29,10 +30,10 @@ pub fn goodness(problem: &Problem, fit: &Fit) -> Goodness {
     let chi_square_ratio = fit.birge_ratio.powi(2);
     let not_judged = if fit.degrees_of_freedom == 0 {
         Some(NotJudged::NoDegreesOfFreedom)
+    } else if ratio_of_another_unit(problem, fit).is_some() || is_unit_in_doubt(problem) {
+        Some(NotJudged::WrongUnit)
     } else if !problem.noise.source.judges() {
         Some(NotJudged::NoNoise)
-    } else if ratio_of_another_unit(problem, fit).is_some() {
-        Some(NotJudged::WrongUnit)
     } else {
         let is_below = chi_square_ratio < MIN_RATIO && fit.p_value > 1.0 - BIRGE_SIGNIFICANCE;
         is_below.then_some(NotJudged::BelowNoise)
@@ -55,6 +56,16 @@ pub(crate) fn ratio_of_another_unit(problem: &Problem, fit: &Fit) -> Option<f64>
     let free = fit.degrees_of_freedom as f64;
     let [by_chance, _] = chi_square_tails(free * ratio * ratio, free)?;
     (ratio < OF_ANOTHER_UNIT && by_chance < BIRGE_SIGNIFICANCE).then_some(ratio)
+}
+
+/// Whether readings without a stated noise have a size that such an instrument does not have, as in another unit. Their repeats
+/// are in the same unit and show nothing.
+fn is_unit_in_doubt(problem: &Problem) -> bool {
+    let is_doubtful = |test: &Test| {
+        let of_test = |readings| Checked { machine: &problem.session.machine, test: &test.name, readings };
+        test.readings.as_deref().is_some_and(|readings| test.station.doubt(&of_test(readings)).is_some())
+    };
+    problem.session.stated_noise_mm().is_none() && problem.tests.iter().any(is_doubtful)
 }
 
 /// What determines each parameter of a problem, by index, and the errors that set-up priors determine, in words.
@@ -126,26 +137,20 @@ impl Determined {
     }
 }
 
-/// What a fit is worth. `contradicted` says why repeats contradict the stated noise ([`crate::noise::stated_against_repeats`]).
-pub fn outcome(
-    problem: &Problem,
-    fit: &Fit,
-    goodness: Goodness,
-    determined: &Determined,
-    contradicted: Option<String>,
-) -> Outcome {
+/// What a fit is worth.
+pub(super) fn outcome(problem: &Problem, fit: &Fit, goodness: Goodness, determined: &Determined) -> Outcome {
     Outcome {
         goodness,
         determined_by_prior: determined.by_prior.clone(),
         not_estimated: determined.not_estimated(problem),
-        assumptions: assumptions(problem, fit, contradicted),
+        assumptions: assumptions(problem, fit),
         ranges: ranges(problem),
     }
 }
 
 /// What a fit assumes, each with its test by the readings.
-fn assumptions(problem: &Problem, fit: &Fit, contradicted: Option<String>) -> Vec<Assumption> {
-    let mut list = vec![noise(problem, contradicted)];
+fn assumptions(problem: &Problem, fit: &Fit) -> Vec<Assumption> {
+    let mut list = vec![noise(problem, stated_against_repeats(problem, &fit.residuals))];
     list.extend(priors(problem, fit));
     let excluded = problem.rejected.iter().flatten().filter(|rejected| **rejected).count();
     if excluded > 0 {

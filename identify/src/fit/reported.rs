@@ -17,7 +17,10 @@ use crate::parameter_description::parameter_meaning;
 use crate::plausibility;
 use crate::positioning::{self, diagonal};
 use crate::problem::Problem;
-use crate::results::{Finding, FitResult, OfAngles, Outlier, ParameterResult, Unobservable, phases_follow_amplitudes};
+use crate::results::{
+    Finding, FitResult, Goodness, ModelResult, OfAngles, Outlier, ParameterResult, Unobservable,
+    phases_follow_amplitudes,
+};
 use crate::straightness;
 use crate::tolerance::conformity;
 use crate::unit::{ARCSEC, Unit};
@@ -27,59 +30,27 @@ use crate::unit::{ARCSEC, Unit};
 /// # Errors
 /// If the model cannot be evaluated for the cross-validation.
 pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> {
-    let vectors = problem.are_vectors();
-    let (rms, held, of_angles) = rms_of_units(problem, &fit.residuals, &fit.held_out.residuals);
-    let in_3d = |rms: f64| vectors.then(|| rms * 3.0_f64.sqrt() * 1e3);
     let plausibility = plausibility::examine(problem, fit);
+    let model = model(problem, fit, outcome::goodness(problem, fit), None)?;
     let mut warnings = problem.session.warnings.clone();
     warnings.extend(plausibility::warnings(&plausibility));
     warnings.extend(plausibility::coefficients::warnings(problem, fit));
-    let contradicted = noise::stated_against_repeats(problem, &fit.residuals);
-    warnings.extend(contradicted.clone());
+    warnings.extend(model.outcome.contradicted_noise().map(str::to_string));
     warnings.extend(noise::rigid_targets(problem));
-    warnings.extend(noise::silent_channels(problem, &fit.residuals, fit.rank.identifiable_basis.ncols()));
+    warnings.extend(noise::silent_channels(problem, &fit.residuals, model.rank));
     warnings.extend(mislabelled_runs(&problem.tests));
     warnings.extend(enlargement_warning(fit.u_enlargement));
     warnings.extend(assume::statements(problem));
-    let goodness = outcome::goodness(problem, fit);
-    let determined = Determined::of(problem, &fit.rank)?;
-    let mut parameters = parameters(problem, fit);
-    determined.mark(problem, &mut parameters, goodness);
-    let noise_um = problem.noise.sigma_mm * 1e3;
     let circular = circular::of_session(&problem.session, problem.noise.sigma_mm, &problem.rejected);
     let diagonals = diagonal::of_session(&problem.session, &problem.rejected);
     Ok(FitResult {
-        reading_unit: problem.unit(),
-        of_angles,
-        noise_um,
-        noise_source: problem.noise.source,
-        noise_ar_coefficients: problem.noise.ar_coefficients.clone(),
-        readings: problem.readings(),
-        rms_um: rms * 1e3,
-        heldout_rms_um: held * 1e3,
-        rms_3d_um: in_3d(rms),
-        heldout_rms_3d_um: in_3d(held),
-        heldout_by: problem.folds.kind.words().to_string(),
-        cross_validation: cross_validation(problem, fit, held, problem)?,
-        rank: fit.rank.identifiable_basis.ncols(),
-        parameter_count: fit.beta.len(),
-        chi_square: fit.chi_square,
-        degrees_of_freedom: fit.degrees_of_freedom,
-        birge_ratio: fit.birge_ratio,
-        u_enlargement: fit.u_enlargement,
-        identifiable: ids(problem, &parameters),
-        covariance: covariance::of_parameters(problem, fit, &parameters),
-        unobservable: unobservable(problem, &fit.rank),
-        null_space: covariance::null_space(problem, &fit.rank),
-        outliers: outliers(problem, fit),
-        conformity: conformity(&problem.session, &parameters, &circular, noise_um, goodness),
-        outcome: outcome::outcome(problem, fit, goodness, &determined, contradicted),
+        conformity: conformity(&problem.session, &model, &circular),
         circular,
         positioning: positioning::of_session(&problem.session, &problem.rejected),
         largest_of_diagonals: diagonal::largest(&diagonals),
         diagonals,
         straightness: straightness::of_session(&problem.session, &problem.rejected),
-        parameters,
+        model,
         plausibility,
         warnings,
         about: problem.session.about.iter().cloned().collect(),
@@ -89,20 +60,84 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> 
     })
 }
 
-/// Root mean square of residuals and of held-out residuals, mm: of the lengths, if there are angles too, whose figures are
-/// apart.
-pub fn rms_of_units(problem: &Problem, residuals: &[Vec<f64>], held_out: &[Vec<f64>]) -> (f64, f64, Option<OfAngles>) {
-    let arcsec = |mm: f64| mm / problem.session.lever_mm * ARCSEC;
-    match [residuals, held_out].map(|residuals| rms_by_unit_mm(problem, residuals)) {
+/// How a search judges a model: on the readings that count at its end, and by its own held-out error.
+#[derive(Clone, Copy)]
+pub struct JudgedBy<'j> {
+    /// The problem whose excluded readings do not count.
+    pub readings: &'j Problem,
+    /// The held-out error by the folds of the search, mm.
+    pub heldout_mm: Option<f64>,
+}
+
+/// The result of a model with its goodness, which a search may know better than the fit alone.
+///
+/// # Errors
+/// If the model cannot be evaluated for the cross-validation.
+pub fn model(
+    problem: &Problem,
+    fit: &Fit,
+    goodness: Goodness,
+    judged_by: Option<JudgedBy<'_>>,
+) -> Result<ModelResult, IdentifyError> {
+    let JudgedBy { readings: judged, heldout_mm } =
+        judged_by.unwrap_or(JudgedBy { readings: problem, heldout_mm: None });
+    let (rms, held, of_angles) = rms_of_units(problem, judged, fit, heldout_mm);
+    let in_3d = |rms: f64| problem.are_vectors().then(|| rms * 3.0_f64.sqrt() * 1e3);
+    let determined = Determined::of(problem, &fit.rank)?;
+    let mut parameters = parameters(problem, fit);
+    determined.mark(problem, &mut parameters, goodness);
+    Ok(ModelResult {
+        reading_unit: problem.unit(),
+        of_angles,
+        noise_um: problem.noise.sigma_mm * 1e3,
+        noise_source: problem.noise.source,
+        noise_ar_coefficients: problem.noise.ar_coefficients.clone(),
+        readings: problem.readings(),
+        rms_um: rms * 1e3,
+        heldout_rms_um: held * 1e3,
+        rms_3d_um: in_3d(rms),
+        heldout_rms_3d_um: in_3d(held),
+        heldout_by: problem.folds.kind.words().to_string(),
+        cross_validation: cross_validation(problem, fit, held, judged)?,
+        rank: fit.rank.identifiable_basis.ncols(),
+        parameter_count: fit.beta.len(),
+        chi_square: fit.chi_square,
+        degrees_of_freedom: fit.degrees_of_freedom,
+        birge_ratio: fit.birge_ratio,
+        u_enlargement: fit.u_enlargement,
+        outcome: outcome::outcome(problem, fit, goodness, &determined),
+        identifiable: ids(problem, &parameters),
+        covariance: covariance::of_parameters(problem, fit, &parameters),
+        unobservable: unobservable(problem, &fit.rank),
+        null_space: covariance::null_space(problem, &fit.rank),
+        outliers: outliers(problem, fit),
+        parameters,
+    })
+}
+
+/// Root mean square of the residuals and of the held-out residuals of a fit, mm: of the lengths, if there are angles too,
+/// whose figures are apart. The held-out error of a search has the proportion of lengths and angles of the fit.
+fn rms_of_units(
+    problem: &Problem,
+    judged: &Problem,
+    fit: &Fit,
+    heldout_mm: Option<f64>,
+) -> (f64, f64, Option<OfAngles>) {
+    let scale = heldout_mm.map_or(1.0, |mm| mm / fit.held_out.rms_mm);
+    let arcsec = |mm: f64| mm / judged.session.lever_mm * ARCSEC;
+    match [&fit.residuals, &fit.held_out.residuals].map(|residuals| rms_by_unit_mm(judged, residuals)) {
         [[Some(rms), Some(of_angles)], [Some(held), Some(held_of_angles)]] => {
             let of_angles = OfAngles {
                 noise_arcsec: arcsec(problem.noise.sigma_mm),
                 rms_arcsec: arcsec(of_angles),
-                heldout_rms_arcsec: arcsec(held_of_angles),
+                heldout_rms_arcsec: arcsec(held_of_angles) * scale,
             };
-            (rms, held, Some(of_angles))
+            (rms, held * scale, Some(of_angles))
         }
-        _ => (rms_mm(problem, residuals), rms_mm(problem, held_out), None),
+        _ => {
+            let held = heldout_mm.unwrap_or_else(|| rms_mm(judged, &fit.held_out.residuals));
+            (rms_mm(judged, &fit.residuals), held, None)
+        }
     }
 }
 
@@ -203,7 +238,7 @@ fn amplitude_and_phase(problem: &Problem, fit: &Fit, j: usize) -> [ParameterResu
 }
 
 /// The identifiers of parameters that have a column of the Jacobian: positions of steps have none and count in no rank.
-pub fn ids(problem: &Problem, parameters: &[ParameterResult]) -> Vec<String> {
+fn ids(problem: &Problem, parameters: &[ParameterResult]) -> Vec<String> {
     let ids = parameters.iter().map(|parameter| parameter.id.clone());
     ids.filter(|id| !problem.parameters.is_position(id)).collect()
 }

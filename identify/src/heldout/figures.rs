@@ -38,7 +38,6 @@ pub fn cross_validation(
     let three = problem.are_vectors().then_some(3.0_f64.sqrt());
     let in_3d = |mm: Option<f64>| Some(in_um(mm?) * three?);
     Ok(CrossValidation {
-        reading_unit: problem.unit(),
         interpolation_rms_um: interpolation.map(in_um),
         interpolation_rms_3d_um: in_3d(interpolation),
         extrapolation_rms_um: extrapolation.map(in_um),

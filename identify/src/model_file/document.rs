@@ -12,6 +12,7 @@ use serde::ser::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
+use super::Quality;
 use crate::noise::NoiseSource;
 use crate::unit::ReadingUnit;
 
@@ -55,7 +56,7 @@ pub struct Document {
     /// The noise of a reading.
     pub noise: Noise,
     /// How well the model describes its own readings.
-    pub fit: FitQuality,
+    pub fit: Quality,
     /// The range of every axis and driver that the readings covered.
     pub ranges: Vec<Range>,
     /// The ranges of each error motion that is a function of the position of its own axis; absent without such errors.
@@ -206,21 +207,6 @@ pub struct Noise {
     pub ar_sum_u: f64,
     /// Factor on the variance of a reading in the likelihood of families of effects; 1 without families.
     pub inflation: f64,
-}
-
-/// How well the model describes its own readings.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(rename = "ModelFit")]
-pub struct FitQuality {
-    /// Number of readings.
-    pub readings: usize,
-    /// Rms of the residual over scalar readings, µm.
-    pub rms_um: f64,
-    /// Rms over held-out scalar readings, µm.
-    pub heldout_rms_um: f64,
-    /// Factor on the uncertainties, which `covariance` contains.
-    pub u_enlargement: f64,
 }
 
 /// The range of an axis or a driver.

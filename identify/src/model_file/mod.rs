@@ -26,6 +26,8 @@ use abbe_model::effect::Effect;
 use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::Prior;
 use faer::Mat;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::noise::Noise;
 use crate::parameters::Role;
@@ -56,16 +58,18 @@ pub struct ModelParameter {
     pub size: f64,
 }
 
-/// How well the model describes its own readings.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// How well the model describes its own readings, as the file has it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "ModelFit")]
 pub struct Quality {
     /// Number of readings.
     pub readings: usize,
-    /// Rms of the residual over scalar readings, µm as in the file, so that a model reads back to the same bits.
+    /// Rms of the residual over scalar readings, µm.
     pub rms_um: f64,
     /// Rms over held-out scalar readings, µm.
     pub heldout_rms_um: f64,
-    /// Factor on the uncertainties, which the covariance contains.
+    /// Factor on the uncertainties, which `covariance` contains.
     pub u_enlargement: f64,
 }
 

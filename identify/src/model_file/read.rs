@@ -22,7 +22,7 @@ use serde_json::Value;
 
 use super::document::{self, Document, SCHEMA, SCHEMA_VERSION};
 use super::write::{CHECKSUM, checksum};
-use super::{DriverRange, IdentifiedModel, ModelParameter, Quality};
+use super::{DriverRange, IdentifiedModel, ModelParameter};
 use crate::error::IdentifyError;
 use crate::noise::Noise;
 use crate::numerics::symmetric::Symmetric;
@@ -146,12 +146,7 @@ fn model(document: Document) -> Result<IdentifiedModel, Fault> {
         locations: locations.collect::<Result<_, Fault>>()?,
         ranges: document.ranges.iter().map(|of| range(&machine, of)).collect(),
         motion_ranges: document.motion_ranges,
-        quality: Quality {
-            readings: document.fit.readings,
-            rms_um: document.fit.rms_um,
-            heldout_rms_um: document.fit.heldout_rms_um,
-            u_enlargement: document.fit.u_enlargement,
-        },
+        quality: document.fit,
         tool_mm: document.tool_mm,
         table_mm: document.table_mm,
         reference: reference(&document.reference),

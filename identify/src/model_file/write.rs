@@ -60,12 +60,7 @@ impl IdentifiedModel {
                 ar_sum_u: self.noise.ar_sum_u,
                 inflation: self.noise.inflation,
             },
-            fit: document::FitQuality {
-                readings: self.quality.readings,
-                rms_um: self.quality.rms_um,
-                heldout_rms_um: self.quality.heldout_rms_um,
-                u_enlargement: self.quality.u_enlargement,
-            },
+            fit: self.quality,
             ranges: self.ranges.iter().map(|range| self.range(range)).collect(),
             motion_ranges: self.motion_ranges.clone(),
             tool_mm: self.tool_mm,

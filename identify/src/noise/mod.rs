@@ -51,7 +51,7 @@ pub struct Noise {
 }
 
 /// Source of a noise standard deviation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum NoiseSource {
     /// Stated in the session.
@@ -63,6 +63,7 @@ pub enum NoiseSource {
     /// Distances between several targets at each pose, which the pose does not change.
     Targets,
     /// The residual of the model: noise and unmodelled effects.
+    #[default]
     Residual,
     /// The saved model that a session is compared with.
     Model,

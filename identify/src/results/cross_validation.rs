@@ -3,14 +3,9 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::unit::ReadingUnit;
-
 /// Held-out errors of a model, by what is held out. Absent where the readings or the tests do not permit it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct CrossValidation {
-    /// The unit of the figures of readings.
-    #[serde(skip)]
-    pub reading_unit: ReadingUnit,
     /// For poses: rms of the residual over held-out random poses, µm. It tests interpolation. The effects of `trace`
     /// are those found on all poses.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -31,7 +31,8 @@ pub enum NotJudged {
     NoNoise,
     /// χ²/ν is significantly below 0.5 (p < 0.001): the noise is overstated.
     BelowNoise,
-    /// The residual is less than a tenth of the noise: probably the unit of the readings is not the stated one.
+    /// The residual is less than a tenth of the stated noise, or, without one, the readings have a size that such an instrument
+    /// does not have: probably the unit of the readings is not the stated one.
     WrongUnit,
     /// The readings are as many as the parameters that they determine.
     NoDegreesOfFreedom,
@@ -105,8 +106,8 @@ impl Goodness {
                      noise that the instrument has"
                 }
                 Some(NotJudged::WrongUnit) => {
-                    "the residual is less than a tenth of the noise: the unit of the readings is probably not the stated \
-                     one; check units and noise"
+                    "the unit of the readings is in doubt (less than a tenth of the noise, or no size of such an instrument): \
+                     it is probably not the stated one; check units and noise"
                 }
                 Some(NotJudged::NoDegreesOfFreedom) => {
                     "no degrees of freedom are left: whether the model lacks an effect cannot be judged; measure more \
@@ -227,6 +228,14 @@ pub struct Outcome {
     pub assumptions: Vec<Assumption>,
     /// The range of the readings along each axis that moves.
     pub ranges: Vec<DataRange>,
+}
+
+impl Outcome {
+    /// Why repeats contradict the stated noise; `None` if they do not.
+    pub fn contradicted_noise(&self) -> Option<&str> {
+        let of_noise = self.assumptions.iter().find(|assumption| assumption.kind == AssumptionKind::Noise);
+        of_noise.filter(|noise| noise.verdict == AssumptionVerdict::Contradicted).map(|noise| noise.test.as_str())
+    }
 }
 
 /// The verdict of a trace.

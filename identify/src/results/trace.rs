@@ -7,57 +7,12 @@ use abbe_model::document::test::Test;
 use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
-use super::cross_validation::CrossValidation;
-use super::outcome::{Goodness, Outcome, TraceVerdict};
-use super::parameter::{Covariance, NullSpace, ParameterResult, Unobservable};
-use super::{OfAngles, Outlier};
-use crate::noise::NoiseSource;
+use super::ModelResult;
+use super::outcome::TraceVerdict;
+use super::parameter::ParameterResult;
 use crate::plausibility::Plausibility;
 use crate::tolerance::Conformity;
 use crate::unit::ReadingUnit;
-
-/// Residual and parameters of a model.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
-pub struct ModelResult {
-    /// The unit of the figures of readings.
-    #[serde(skip)]
-    pub reading_unit: ReadingUnit,
-    /// Rms of the residual over scalar readings, µm.
-    pub rms_um: f64,
-    /// Rms of the residual over scalar readings that neither fit nor search used, µm.
-    pub heldout_rms_um: f64,
-    /// Rms length of the residual vector, µm, for instruments with three coordinates.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rms_3d_um: Option<f64>,
-    /// Rms length of the residual vector over held-out readings, µm, for instruments with three coordinates.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub heldout_rms_3d_um: Option<f64>,
-    /// The same of the angles, if readings are lengths and angles; the figures in µm are then those of the lengths.
-    #[serde(flatten)]
-    pub of_angles: Option<OfAngles>,
-    /// Held-out errors by what is held out.
-    #[serde(flatten)]
-    pub cross_validation: CrossValidation,
-    /// Standard deviation of one scalar reading from which the uncertainties follow, µm. Where the source is
-    /// `residual`, that of this model.
-    pub noise_um: f64,
-    /// Numerical rank: number of independent combinations of the parameters that are identifiable.
-    pub rank: usize,
-    /// Number of parameters, set-up parameters included.
-    pub parameter_count: usize,
-    /// χ² of the fit, priors counted as observations.
-    pub chi_square: f64,
-    /// Degrees of freedom of χ²: scalar readings plus priors less rank.
-    pub degrees_of_freedom: usize,
-    /// The residual against the noise, and whether estimates may be quoted.
-    pub goodness: Goodness,
-    /// The identifiable parameters.
-    pub parameters: Vec<ParameterResult>,
-    /// Identifiers of all identifiable parameters, set-up parameters included.
-    pub identifiable: Vec<String>,
-    /// Covariance of `parameters`.
-    pub covariance: Covariance,
-}
 
 /// An effect by its keys of session files.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -342,22 +297,10 @@ pub struct TraceResult {
     pub unique: bool,
     /// Standard deviation of one scalar reading with the found effects, µm: that of `after`.
     pub noise_um: f64,
-    /// Source of `noise_um`: `stated` by the session, `repeats` (repeated readings), or `residual` where there is
-    /// neither. The residual of the model with its effects also holds what that model lacks.
-    pub noise_source: NoiseSource,
-    /// Autoregressive coefficients of the noise along a run; empty for white noise.
-    pub noise_ar_coefficients: Vec<f64>,
-    /// Number of readings without outliers.
-    pub readings: usize,
-    /// What each fold of the cross-validation holds out.
-    pub heldout_by: String,
     /// The declared model.
     pub before: ModelResult,
     /// The model with the found effects.
     pub after: ModelResult,
-    /// What the result is worth: the residual of the model with the found effects against the noise, what determines
-    /// its estimates, what is assumed.
-    pub outcome: Outcome,
     /// The effects, in the order in which they were found.
     pub effects: Vec<EffectResult>,
     /// The residual of the model with the found effects.
@@ -380,12 +323,6 @@ pub struct TraceResult {
     /// What location errors of rotary axes rest on: motions of their axes that the readings do not separate from them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub presumed: Vec<String>,
-    /// The null-space directions of the model with the found effects, in words.
-    pub unobservable: Vec<Unobservable>,
-    /// The null space of the model with the found effects, as a matrix.
-    pub null_space: NullSpace,
-    /// Readings excluded as outliers.
-    pub outliers: Vec<Outlier>,
     /// Decisions of conformity about the model with the found effects, if the session states limits.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub conformity: Option<Conformity>,

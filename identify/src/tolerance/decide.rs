@@ -8,25 +8,20 @@ use super::results::{Conformity, ConformityItem};
 use super::rule::{Decision, Rule};
 use crate::circular::CircularTest;
 use crate::quantity::Given;
-use crate::results::{Goodness, NotJudged, ParameterResult};
+use crate::results::{ModelResult, NotJudged, ParameterResult};
 
 /// The decisions about the results of a session; `None` if it states no limits. None is made about a parameter while the
 /// model lacks an effect, or cannot be judged.
-pub fn conformity(
-    session: &Session,
-    parameters: &[ParameterResult],
-    circular: &[CircularTest],
-    noise_um: f64,
-    goodness: Goodness,
-) -> Option<Conformity> {
+pub fn conformity(session: &Session, model: &ModelResult, circular: &[CircularTest]) -> Option<Conformity> {
+    let goodness = model.outcome.goodness;
     let Tolerance { probability, limits } = session.tolerance.as_ref()?;
     let items: Vec<ConformityItem> = limits
         .iter()
         .map(|limit| {
             let measured = match &limit.of {
-                Toleranced::Parameter(id) => of_parameter(parameters, id),
+                Toleranced::Parameter(id) => of_parameter(&model.parameters, id),
                 Toleranced::Figure { test, figure, instrument_u_um } => {
-                    figures::measured(session, circular, test, *figure, noise_um, *instrument_u_um)
+                    figures::measured(session, circular, test, *figure, model.noise_um, *instrument_u_um)
                 }
             };
             let below_noise =

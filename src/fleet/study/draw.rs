@@ -192,8 +192,8 @@ impl Study {
             Analysis::Fit => {
                 let (problem, found) = fit::prepare(session, seed)?;
                 let result = fit::report(&problem, &found)?;
-                draw.rms_um = result.rms_um;
-                draw.compare(&result.parameters, &truth.locations);
+                draw.rms_um = result.model.rms_um;
+                draw.compare(&result.model.parameters, &truth.locations);
             }
             Analysis::Trace => {
                 let options = TraceOptions { seed, ..TraceOptions::default() };

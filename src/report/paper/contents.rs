@@ -242,7 +242,7 @@ pub fn trace(study: &Study) -> Result<Option<Part>, IdentifyError> {
     let plots = SessionPlots::new(&fitted.problem, &series);
     let models = ["nominal machine", "fit"];
     let mut report = Report::new("Estimates and residuals");
-    let all: Vec<_> = fitted.result.parameters.iter().collect();
+    let all: Vec<_> = fitted.result.model.parameters.iter().collect();
     report.key(parameters::table(&all, None).named("estimates"));
     let residuals = test_table(&plots, models).titled("Root mean square residual of each test");
     report.key(residuals.named("residuals"));

@@ -14,23 +14,23 @@ pub fn part(study: &Study) -> Part {
     let mut report = Report::new("Methods");
     [machine(study), estimation(study), uncertainty(study)].into_iter().for_each(|text| report.key(text));
     if let Some(fitted) = &study.fitted {
-        let result = &fitted.result;
-        let enlarged = if result.u_enlargement > 1.0 {
+        let model = &fitted.result.model;
+        let enlarged = if model.u_enlargement > 1.0 {
             format!(
                 " The residual exceeds the noise significantly, so that all uncertainties are enlarged by {:.2}.",
-                result.u_enlargement
+                model.u_enlargement
             )
         } else {
             String::new()
         };
-        let source = match result.noise_source {
+        let source = match model.noise_source {
             NoiseSource::Stated => "is that of the instrument",
             NoiseSource::Repeats => "is estimated from repeated readings",
             NoiseSource::Targets => "is estimated from the distances between the targets at each pose",
             _ => "is estimated from the residual",
         };
         let coefficients: Vec<String> =
-            result.noise_ar_coefficients.iter().map(|coefficient| format!("{coefficient:.2}")).collect();
+            model.noise_ar_coefficients.iter().map(|coefficient| format!("{coefficient:.2}")).collect();
         let along_runs = match coefficients.len() {
             0 => String::new(),
             order => format!(
@@ -41,14 +41,14 @@ pub fn part(study: &Study) -> Part {
         report.key(format!(
             "The fit of {} has a root mean square residual of {} and of {} for held-out readings ({} left out in turn). \
              The noise standard deviation of {} {source}.{along_runs} χ² is {:.0} for {} degrees of freedom (Birge ratio {:.2}).{enlarged}",
-            counted(result.readings, "reading"),
-            of_readings(result.rms_um, result.reading_unit),
-            of_readings(result.heldout_rms_um, result.reading_unit),
-            result.heldout_by,
-            of_readings(result.noise_um, result.reading_unit),
-            result.chi_square,
-            result.degrees_of_freedom,
-            result.birge_ratio,
+            counted(model.readings, "reading"),
+            of_readings(model.rms_um, model.reading_unit),
+            of_readings(model.heldout_rms_um, model.reading_unit),
+            model.heldout_by,
+            of_readings(model.noise_um, model.reading_unit),
+            model.chi_square,
+            model.degrees_of_freedom,
+            model.birge_ratio,
         ));
     }
     Part { subject: Subject::Methods, report }

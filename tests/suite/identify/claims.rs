@@ -31,7 +31,7 @@ fn assert_consistent(result: &TraceResult, what: &str) {
     let found = !result.effects.is_empty();
     let named = matches!(result.verdict, TraceVerdict::Explained | TraceVerdict::PartlyExplained);
     assert!(found || !named, "{what}: {}", result.verdict);
-    let complete = !result.outcome.goodness.verdict.lacks_an_effect();
+    let complete = !result.after.outcome.goodness.verdict.lacks_an_effect();
     assert_eq!(result.verdict == TraceVerdict::Clean, !found && complete, "{what}");
     assert!(!(complete && result.remainder.structured), "{what}");
     if found {
@@ -83,11 +83,15 @@ fn a_fit_and_a_trace_of_autocorrelated_noise_give_one_answer() {
         let of_trace = traced(&session, TraceOptions::default().significance);
         let what = format!("{readings} readings");
         assert_eq!(of_trace.verdict, TraceVerdict::Clean, "{what}");
-        assert_eq!(of_fit.noise_ar_coefficients.len(), 1, "{what}: {:?}", of_fit.noise_ar_coefficients);
-        assert!((of_fit.noise_ar_coefficients[0] - 0.8).abs() < 0.2, "{what}: {:?}", of_fit.noise_ar_coefficients);
-        assert_eq!(of_fit.noise_ar_coefficients, of_trace.noise_ar_coefficients, "{what}");
-        assert_eq!(of_fit.outcome.goodness, of_trace.outcome.goodness, "{what}");
-        for (of_fit, of_trace) in of_fit.parameters.iter().zip(&of_trace.after.parameters) {
+        assert_eq!(of_fit.model.noise_ar_coefficients.len(), 1, "{what}: {:?}", of_fit.model.noise_ar_coefficients);
+        assert!(
+            (of_fit.model.noise_ar_coefficients[0] - 0.8).abs() < 0.2,
+            "{what}: {:?}",
+            of_fit.model.noise_ar_coefficients
+        );
+        assert_eq!(of_fit.model.noise_ar_coefficients, of_trace.after.noise_ar_coefficients, "{what}");
+        assert_eq!(of_fit.model.outcome.goodness, of_trace.after.outcome.goodness, "{what}");
+        for (of_fit, of_trace) in of_fit.model.parameters.iter().zip(&of_trace.after.parameters) {
             assert_eq!((&of_fit.id, of_fit.value, of_fit.u), (&of_trace.id, of_trace.value, of_trace.u), "{what}");
         }
     }
@@ -104,8 +108,8 @@ fn a_stated_noise_that_repeats_contradict_gives_no_claim() {
         session.noise_mm = Some(1e-3 * stated_um);
         let result = traced(&session, TraceOptions::default().significance);
         assert!(result.effects.is_empty(), "{stated_um}: {:?}", result.effects);
-        assert_eq!(result.noise_source, NoiseSource::Repeats, "{stated_um}");
-        assert!((result.noise_um / 0.3 - 1.0).abs() < 0.3, "{stated_um}: {}", result.noise_um);
+        assert_eq!(result.after.noise_source, NoiseSource::Repeats, "{stated_um}");
+        assert!((result.after.noise_um / 0.3 - 1.0).abs() < 0.3, "{stated_um}: {}", result.after.noise_um);
     }
 }
 
@@ -122,7 +126,7 @@ fn a_warm_up_in_one_run_is_an_effect_and_no_slow_noise() {
     let found: Vec<&EffectName> = result.effects.iter().map(|effect| &effect.name).collect();
     let [name] = found.as_slice() else { panic!("{found:?}") };
     assert_eq!([&name.component, &name.driver, &name.shape], ["EC0Y", "time", "warmup"]);
-    assert!((result.noise_um / 0.3 - 1.0).abs() < 0.1, "{}", result.noise_um);
+    assert!((result.after.noise_um / 0.3 - 1.0).abs() < 0.1, "{}", result.after.noise_um);
     assert_consistent(&result, "a warm-up");
 }
 

@@ -1,7 +1,7 @@
 //! Figures of rotary sweeps and the set-up of the balls: uncertainty, coverage and decisions against readings of a closed
 //! form; what a bar beside the radius and a bar of unknown length do not tell.
 
-use abbe::identify::results::{Goodness, GoodnessVerdict};
+use abbe::identify::results::{Goodness, GoodnessVerdict, ModelResult, Outcome};
 use std::f64::consts::TAU;
 
 use abbe::files::read::add_node;
@@ -66,10 +66,9 @@ fn decided(session: &mut Session, figure: TestFigure, lower: f64, upper: f64, no
     let of = Toleranced::Figure { test: "C".into(), figure, instrument_u_um: 0.0 };
     let limits = vec![Limit { of, lower: Some(lower), upper, unit: "um" }];
     session.tolerance = Some(Tolerance { probability: 0.95, limits });
-    conformity(session, &[], &figures(session), noise_um, Goodness::default().with_verdict(GoodnessVerdict::Agrees))
-        .unwrap()
-        .items
-        .remove(0)
+    let goodness = Goodness::default().with_verdict(GoodnessVerdict::Agrees);
+    let model = ModelResult { noise_um, outcome: Outcome { goodness, ..Outcome::default() }, ..ModelResult::default() };
+    conformity(session, &model, &figures(session)).unwrap().items.remove(0)
 }
 
 fn with_priors(mut session: Session) -> Session {

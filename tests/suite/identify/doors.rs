@@ -89,7 +89,8 @@ impl Door {
         // The model holds for its own readings unless its residual was judged to lack an effect. Poses without a stated
         // noise are judged by that of the model.
         let validation = self.run(&[&["validate", model, next], reading].concat(), "validation.json");
-        let lacks = matches!(walk.trace["outcome"]["goodness"]["verdict"].as_str(), Some("exceeds" | "structured"));
+        let lacks =
+            matches!(walk.trace["after"]["outcome"]["goodness"]["verdict"].as_str(), Some("exceeds" | "structured"));
         assert_eq!(validation["verdict"] == "holds", !lacks, "{} {}", walk.trace["verdict"], validation["verdict"]);
         // Both correct a command alike, and export the same chain.
         let commands = self.at("commands.csv");
@@ -192,15 +193,17 @@ impl Walk {
             // The saved models: every location error and set-up parameter that has a value of its own.
             for model in &self.models {
                 let own = list(&model["parameters"], name).iter().find(|p| p["id"] == a["id"] && p["held"] == false);
-                if let Some(own) = own.filter(|_| self.trace["unobservable"].as_array().is_some_and(Vec::is_empty)) {
+                if let Some(own) =
+                    own.filter(|_| self.trace["after"]["unobservable"].as_array().is_some_and(Vec::is_empty))
+                {
                     assert!(near(&own["u"], &a["u"]) && near(&own["value"], &a["value"]), "{name}: {own} {a}");
                 }
             }
         }
         // The trace also tests the residual for structure; without it both judge the residual alike.
-        if self.trace["outcome"]["goodness"]["verdict"] != "structured" {
+        if self.trace["after"]["outcome"]["goodness"]["verdict"] != "structured" {
             assert_eq!(
-                self.trace["outcome"]["goodness"]["verdict"], self.fit["outcome"]["goodness"]["verdict"],
+                self.trace["after"]["outcome"]["goodness"]["verdict"], self.fit["outcome"]["goodness"]["verdict"],
                 "{name}"
             );
             let decisions = |of: &Value| -> Vec<Value> {
@@ -330,7 +333,7 @@ fn outliers() {
     fs::write(&file, lines.join("\n") + "\n").unwrap();
     let walk = door.walk(&["~C:h"]);
     walk.agrees("outliers");
-    for of in [&walk.trace, &walk.fit] {
+    for of in [&walk.trace["after"], &walk.fit] {
         assert!(!list(&of["outliers"], "outliers").is_empty());
         let assumptions = list(&of["outcome"]["assumptions"], "assumptions");
         let excluded = assumptions.iter().find(|one| one["kind"] == "excluded-readings").unwrap();
@@ -410,7 +413,11 @@ fn fit_and_trace_state_one_noise() {
             let trace = door.run(&["trace", text(&session), "--only", "EZC"], "trace.json");
             let of_both = |key: &str| assert_eq!(fit[key], trace["before"][key], "{folder}, {source}: {key}");
             ["noise_um", "chi_square", "degrees_of_freedom"].into_iter().for_each(of_both);
-            assert_eq!((&fit["noise_source"], &trace["noise_source"]), (&source.into(), &source.into()), "{folder}");
+            assert_eq!(
+                (&fit["noise_source"], &trace["before"]["noise_source"]),
+                (&source.into(), &source.into()),
+                "{folder}"
+            );
         }
     }
 }

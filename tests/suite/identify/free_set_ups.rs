@@ -247,17 +247,17 @@ fn any_start_gives_the_same_fit() {
                         println!("{kind:?} {number} {seed} {off_mm}: refused");
                         continue;
                     };
-                    let ratio = found.chi_square / found.degrees_of_freedom as f64;
+                    let ratio = found.model.chi_square / found.model.degrees_of_freedom as f64;
                     assert!(ratio < 1.4, "{kind:?} {number} {off_mm}: {ratio}");
                     assert!(accepted(&found.plausibility).is_ok());
                     let Some(right) = &right else {
                         right = Some(found);
                         continue;
                     };
-                    let is_same = (found.chi_square / right.chi_square - 1.0).abs() < 1e-6;
+                    let is_same = (found.model.chi_square / right.model.chi_square - 1.0).abs() < 1e-6;
                     differ += u64::from(!is_same);
                     let errors = |result: &FitResult| {
-                        let errors = result.parameters.iter().filter(|one| one.id.starts_with('E'));
+                        let errors = result.model.parameters.iter().filter(|one| one.id.starts_with('E'));
                         errors.map(|one| (one.id.clone(), one.value, one.u)).collect::<Vec<_>>()
                     };
                     for ((id, value, u), (other, expected, _)) in errors(&found).into_iter().zip(errors(right)) {
@@ -290,9 +290,9 @@ fn a_noise_that_is_not_stated_is_that_of_repeats_or_of_the_residual() {
         session.noise_mm = None;
         session.resolution_mm = None;
         let found = fitted(&session).unwrap();
-        assert_eq!(found.noise_source, source);
-        assert!((found.noise_um / 0.3 - 1.0).abs() < 0.06, "{file}: {}", found.noise_um);
-        for (own, expected) in found.parameters.iter().zip(&stated.parameters) {
+        assert_eq!(found.model.noise_source, source);
+        assert!((found.model.noise_um / 0.3 - 1.0).abs() < 0.06, "{file}: {}", found.model.noise_um);
+        for (own, expected) in found.model.parameters.iter().zip(&stated.model.parameters) {
             assert_eq!(own.id, expected.id);
             let apart = (own.value - expected.value).abs();
             assert!(apart < 0.1 * expected.u, "{file}, {}: {} {}", own.id, own.value, expected.value);
@@ -382,12 +382,12 @@ fn a_weak_combination_is_not_called_confounded() {
     let folder = tempfile::tempdir().unwrap();
     let mut session = Simulated::new(UR5E, 3).write(folder.path(), Kind::Tracker, 0.0, as_it_is);
     let exact = fitted(&session).unwrap();
-    assert!(exact.unobservable.iter().all(|one| one.finding == Finding::Structural));
+    assert!(exact.model.unobservable.iter().all(|one| one.finding == Finding::Structural));
     session.noise_mm = Some(30.0);
     let noisy = fitted(&session).unwrap();
-    let weak = noisy.unobservable.iter().filter(|one| one.finding == Finding::Weak).count();
-    assert!(weak > 0 && noisy.unobservable.len() > exact.unobservable.len());
-    for one in noisy.unobservable.iter().filter(|one| one.finding == Finding::Weak) {
+    let weak = noisy.model.unobservable.iter().filter(|one| one.finding == Finding::Weak).count();
+    assert!(weak > 0 && noisy.model.unobservable.len() > exact.model.unobservable.len());
+    for one in noisy.model.unobservable.iter().filter(|one| one.finding == Finding::Weak) {
         assert!(one.why.contains("weakly determined") && !one.why.contains("unchanged"), "{}", one.why);
     }
 }

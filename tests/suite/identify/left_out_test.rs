@@ -64,16 +64,26 @@ fn the_right_component_predicts_a_left_out_radius_and_its_alias_does_not() {
     for test in &session.tests {
         let one = Session { tests: vec![test.clone()], ..session.clone() };
         let [axial, tilt] = [("EZC", 2.0), ("EAC", 1.0)].map(|(component, order)| fitted(&one, component, order));
-        assert!(axial.rms_um < 0.32 && tilt.rms_um < 1.02 * axial.rms_um, "{} {}", axial.rms_um, tilt.rms_um);
-        assert_eq!(axial.cross_validation.left_out_test_rms_um, None);
+        assert!(
+            axial.model.rms_um < 0.32 && tilt.model.rms_um < 1.02 * axial.model.rms_um,
+            "{} {}",
+            axial.model.rms_um,
+            tilt.model.rms_um
+        );
+        assert_eq!(axial.model.cross_validation.left_out_test_rms_um, None);
     }
     let [axial, tilt] = [("EZC", 2.0), ("EAC", 1.0)].map(|(component, order)| fitted(&session, component, order));
     for result in [&axial, &tilt] {
-        assert_eq!(result.cross_validation.left_out_tests, ["R50", "R100"], "{:?}", result.cross_validation);
-        assert_eq!(result.cross_validation.left_out_run_rms_um, Some(result.heldout_rms_um));
-        assert_eq!(result.cross_validation.extrapolation_rms_um, None);
+        assert_eq!(
+            result.model.cross_validation.left_out_tests,
+            ["R50", "R100"],
+            "{:?}",
+            result.model.cross_validation
+        );
+        assert_eq!(result.model.cross_validation.left_out_run_rms_um, Some(result.model.heldout_rms_um));
+        assert_eq!(result.model.cross_validation.extrapolation_rms_um, None);
     }
-    let [axial, tilt] = [axial, tilt].map(|result| result.cross_validation.left_out_test_rms_um.unwrap());
+    let [axial, tilt] = [axial, tilt].map(|result| result.model.cross_validation.left_out_test_rms_um.unwrap());
     println!("left-out radius: EZC order 2 {axial:.3} µm, EAC order 1 {tilt:.3} µm");
     assert!(axial < 0.33, "{axial}");
     assert!(tilt > 2.0 * axial, "{tilt} {axial}");
@@ -89,7 +99,7 @@ fn a_test_that_alone_identifies_a_parameter_is_named_and_not_left_out() {
         tests: only,
         ..Effect::new(Moved::parse("EZC").unwrap(), FollowedDriver::parse("C"), Form::Harmonic(Harmonic { order: 2.0 }))
     }];
-    let result = SessionFit::of(&session, 1).unwrap().result.cross_validation;
+    let result = SessionFit::of(&session, 1).unwrap().result.model.cross_validation;
     assert_eq!(result.left_out_tests, ["R100"]);
     assert_eq!(result.tests_not_left_out.len(), 1);
     assert_eq!(result.tests_not_left_out[0].test, "R50");

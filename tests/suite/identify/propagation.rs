@@ -33,7 +33,7 @@ fn drawn(session: &Session, runs: u64, seed: u64) -> FitMonteCarlo {
     let draws = MonteCarlo { runs, seed, coverage: 0.95 };
     add_monte_carlo(&problem, &fit, &draws, &mut result).unwrap();
     let drawn = result.monte_carlo.unwrap();
-    for (parameter, own) in result.parameters.iter().zip(&drawn.parameters) {
+    for (parameter, own) in result.model.parameters.iter().zip(&drawn.parameters) {
         assert_eq!(parameter.id, own.id);
         let quoted = if own.verdict == Verdict::Agree { own.gum_u } else { own.u };
         assert_eq!(parameter.u, quoted);

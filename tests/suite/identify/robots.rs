@@ -25,9 +25,9 @@ fn fitted(session: &Session) -> FitResult {
 
 /// Rms length of the vector over held-out blocks of joint space and over held-out random poses, mm. The first decides.
 fn held_out(result: &FitResult) -> [f64; 2] {
-    let model = &result.cross_validation;
-    assert_eq!(result.heldout_rms_um, model.extrapolation_rms_um.unwrap());
-    let ratio = result.heldout_rms_3d_um.unwrap() / model.extrapolation_rms_3d_um.unwrap();
+    let model = &result.model.cross_validation;
+    assert_eq!(result.model.heldout_rms_um, model.extrapolation_rms_um.unwrap());
+    let ratio = result.model.heldout_rms_3d_um.unwrap() / model.extrapolation_rms_3d_um.unwrap();
     assert!((ratio - 1.0).abs() < 1e-12, "{ratio}");
     [model.extrapolation_rms_3d_um, model.interpolation_rms_3d_um].map(|um| um.unwrap() * 1e-3)
 }
@@ -44,7 +44,7 @@ fn ur10_with_pose_and_target_only() {
     println!("UR10, pose and target: {extrapolation:.4} mm in held-out blocks, {interpolation:.4} mm in random poses");
     assert!((0.83..0.85).contains(&interpolation), "{interpolation}");
     assert!((0.93..1.0).contains(&extrapolation), "{extrapolation}");
-    assert_eq!((result.parameter_count, result.rank), (9, 9));
+    assert_eq!((result.model.parameter_count, result.model.rank), (9, 9));
 }
 
 #[test]
@@ -58,18 +58,18 @@ fn ur10_with_every_location_error() {
     println!(
         "UR10, all location errors: {extrapolation:.4} mm in held-out blocks, {interpolation:.4} mm in random poses, \
          rank {} of {}",
-        result.rank, result.parameter_count
+        result.model.rank, result.model.parameter_count
     );
     // An independent program (NumPy, SciPy's k-means) gives 0.439 mm over random tenths, and 0.483 to 0.497 mm over ten
     // k-means blocks from six seeds.
     assert!((0.438..0.441).contains(&interpolation), "{interpolation}");
     assert!((0.475..0.505).contains(&extrapolation), "{extrapolation}");
-    assert_eq!((result.rank, result.parameter_count), (25, 45));
-    assert_eq!(result.unobservable.len(), 20);
+    assert_eq!((result.model.rank, result.model.parameter_count), (25, 45));
+    assert_eq!(result.model.unobservable.len(), 20);
     // Parameters that are not identifiable are named and have no value.
-    for unobservable in &result.unobservable {
+    for unobservable in &result.model.unobservable {
         assert!(!unobservable.combination.is_empty() && !unobservable.why.is_empty());
-        for parameter in &result.parameters {
+        for parameter in &result.model.parameters {
             assert!(!unobservable.combination.contains_key(&parameter.id), "{}", parameter.id);
         }
     }
@@ -85,11 +85,11 @@ fn kuka_is_fitted_and_two_badly_seated_poses_are_outliers() {
     let [extrapolation, interpolation] = held_out(&result);
     println!(
         "KUKA: {extrapolation:.4} mm in held-out blocks, {interpolation:.4} mm in random poses; {:?}",
-        result.outliers
+        result.model.outliers
     );
     assert!(interpolation <= 0.25, "{interpolation}");
     assert!(extrapolation > interpolation && extrapolation <= 0.35, "{extrapolation}");
-    assert_eq!(result.outliers.len(), 2, "{:?}", result.outliers);
+    assert_eq!(result.model.outliers.len(), 2, "{:?}", result.model.outliers);
 }
 
 #[test]
@@ -100,7 +100,7 @@ fn kuka_with_ball_and_sockets_only() {
     };
     session.unknowns.clear();
     let result = fitted(&session);
-    let in_sample = result.rms_3d_um.unwrap() * 1e-3;
+    let in_sample = result.model.rms_3d_um.unwrap() * 1e-3;
     println!("KUKA, ball and sockets: {in_sample:.4} mm in sample");
     assert!((0.53..0.57).contains(&in_sample), "{in_sample}");
 }
@@ -123,9 +123,9 @@ fn views_of_the_workspace_hold_every_pose() {
         for view in &found {
             assert_eq!(view.unit, unit);
             let poses: usize = view.cells.iter().map(|cell| cell.readings).sum();
-            assert_eq!(poses, result.readings);
+            assert_eq!(poses, result.model.readings);
             let squares: f64 = view.cells.iter().map(|cell| cell.readings as f64 * cell.after * cell.after).sum();
-            let ratio = (squares / poses as f64).sqrt() / result.rms_3d_um.unwrap();
+            let ratio = (squares / poses as f64).sqrt() / result.model.rms_3d_um.unwrap();
             println!("{:?}: {poses} poses in {} cells, rms ratio {ratio}", view.names, view.cells.len());
             assert!((ratio - 1.0).abs() < 1e-9);
         }

@@ -134,7 +134,7 @@ fn test(number: usize, station: Station<f64>, readings: Readings, axes: usize) -
 fn fitted(session: &Session) -> FitResult {
     let (problem, fit) = prepare(session, 1).unwrap();
     let result = report(&problem, &fit).unwrap();
-    assert!(result.outliers.is_empty());
+    assert!(result.model.outliers.is_empty());
     result
 }
 
@@ -147,9 +147,9 @@ fn same(
     within: f64,
     expected: impl Fn(&str, f64) -> f64,
 ) -> Result<(), TestCaseError> {
-    prop_assert_eq!(one.rank, other.rank);
+    prop_assert_eq!(one.model.rank, other.model.rank);
     let of = |result: &FitResult| -> BTreeMap<String, (f64, f64)> {
-        let parameters = result.parameters.iter();
+        let parameters = result.model.parameters.iter();
         parameters.map(|p| (p.id.clone(), (p.value, p.u))).collect()
     };
     let (one, other) = (of(one), of(other));
@@ -189,8 +189,8 @@ proptest! {
         }
         let (one, other) = (fitted(&session), fitted(&other));
         same(&one, &other, 1e-4, |_, value| value)?;
-        close(one.rms_um, other.rms_um)?;
-        close(one.heldout_rms_um, other.heldout_rms_um)?;
+        close(one.model.rms_um, other.model.rms_um)?;
+        close(one.model.heldout_rms_um, other.model.heldout_rms_um)?;
     }
 
     #[test]
@@ -200,8 +200,8 @@ proptest! {
         other.unknowns.reverse();
         let (one, other) = (fitted(&session), fitted(&other));
         same(&one, &other, 1e-4, |_, value| value)?;
-        close(one.rms_um, other.rms_um)?;
-        close(one.heldout_rms_um, other.heldout_rms_um)?;
+        close(one.model.rms_um, other.model.rms_um)?;
+        close(one.model.heldout_rms_um, other.model.heldout_rms_um)?;
     }
 
     #[test]
@@ -227,7 +227,7 @@ proptest! {
         let (one, other) = (fitted(&session), fitted(&other));
         let sign = |id: &str| ErrorName::parse(id).map_or(1.0, |name| mirror_sign(name.freedom.index(), coordinate));
         same(&one, &other, 1e-4, |id, value| sign(id) * value)?;
-        close(one.heldout_rms_um, other.heldout_rms_um)?;
+        close(one.model.heldout_rms_um, other.model.heldout_rms_um)?;
     }
 
     /// An effect with zero coefficients, or on a test that does not exist, changes no reading.
@@ -267,7 +267,7 @@ fn the_drawn_errors_are_recovered() {
         let drawn = machines().new_tree(&mut runner).unwrap().current();
         let balls = vec((point(), point()), TESTS).new_tree(&mut runner).unwrap().current();
         let session = session(&drawn, &balls, true, 5);
-        for parameter in fitted(&session).parameters {
+        for parameter in fitted(&session).model.parameters {
             let Some(slot) = ErrorName::parse(&parameter.id).and_then(|name| session.machine.error_slot(&name)) else {
                 continue;
             };

@@ -30,7 +30,7 @@ fn a_document_states_version_command_inputs_and_options() {
     let folder = tempfile::tempdir().unwrap();
     let residuals = folder.path().join("residuals.csv");
     let fit = document(&["fit", text(&session), "--seed", "7", "--residuals", text(&residuals)]);
-    assert_eq!(fit["schema_version"], 2);
+    assert_eq!(fit["schema_version"], 3);
     assert_eq!(fit["tool_version"], env!("CARGO_PKG_VERSION"));
     assert_eq!((&fit["command"], &fit["seed"]), (&json!("fit"), &json!(7)));
     assert_eq!(fit["options"], json!({"residuals": text(&residuals)}));

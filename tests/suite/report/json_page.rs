@@ -55,7 +55,7 @@ A unit stands in the name of a field (`_um` µm, `_mm` mm, `_deg` °, `_min` min
 field `unit` beside it (`um`, `arcsec`, `deg`, `um/K`, …). `u` is a standard uncertainty, `expanded_u` is 2 `u`. Numbers that do not
 exist are `null`. A field marked *optional* is absent where it does not apply.
 
-`schema_version` is 2. It increases when a field changes its name or its meaning, or is removed; new fields leave it unchanged.
+`schema_version` is 3. It increases when a field changes its name or its meaning, or is removed; new fields leave it unchanged.
 ";
 
 pub(super) fn schema(subject: &str) -> Value {

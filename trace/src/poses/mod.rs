@@ -26,6 +26,7 @@ use super::candidates::columns::Columns;
 use super::constants::HIGHEST_ORDER_OF_SPECTRA;
 use super::interrupt::Interrupt;
 use super::policy::{Policy, has_few_poses};
+use super::result::effective_parameters;
 use super::{Progress, TraceOptions};
 use crate::paired::HeldOutDecrease;
 pub(super) use aliases::PoseAlias;
@@ -185,6 +186,8 @@ pub(super) fn search(
     Ok(Some(chosen))
 }
 
+/// Effective number of parameters below which a member of a family explains nothing.
+const EXPLAINS_NOTHING: f64 = 0.05;
 /// Share of the coefficients of the spectra of all joints in the scalar readings below which a curve of all orders predicts
 /// as well as the few orders that it has: needless coefficients raise the held-out error by half of this share.
 const NEGLIGIBLE_COEFFICIENTS: f64 = 0.05;
@@ -213,9 +216,20 @@ impl PoseSearch {
             ended => (ended?, false),
         };
         let Ended { detectable, last_p_value } = ended;
-        let PoseModel { problem, effects, proposed, .. } = model;
+        let PoseModel { problem, mut effects, proposed, .. } = model;
         let own: Vec<Effect> = effects.iter().map(|accepted| accepted.effect.clone()).collect();
-        let (problem, fit) = prepare_with(&problem.session, &own, seed)?;
+        let declared = problem.parameters.effects.len() - own.len();
+        let (mut problem, mut fit) = prepare_with(&problem.session, &own, seed)?;
+        // A member of a family that has only its prior explains nothing.
+        let determined = |k: usize| effective_parameters(&problem, &fit.covariance, declared + k);
+        let idle = |k: usize| determined(k).is_some_and(|effective| effective < EXPLAINS_NOTHING);
+        let kept: Vec<bool> = (0..own.len()).map(|k| !idle(k)).collect();
+        if kept.contains(&false) {
+            let mut is_kept = kept.iter();
+            effects.retain(|_| is_kept.next() == Some(&true));
+            let own: Vec<Effect> = effects.iter().map(|accepted| accepted.effect.clone()).collect();
+            (problem, fit) = prepare_with(&problem.session, &own, seed)?;
+        }
         let candidates = library.count();
         Ok(PoseSearch { problem, fit, effects, proposed, candidates, detectable, last_p_value, interrupted })
     }

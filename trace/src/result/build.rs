@@ -2,16 +2,15 @@
 //! and for a trace that ended before its search.
 
 use abbe_identify::error::IdentifyError;
-use abbe_identify::fit::outcome::{self, Determined};
-use abbe_identify::fit::{self, Fit};
+use abbe_identify::fit::outcome::goodness;
+use abbe_identify::fit::{self, Fit, JudgedBy};
 use abbe_identify::heldout::mislabelled_runs;
-use abbe_identify::noise;
 use abbe_identify::plausibility::{self, Plausibility};
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{EffectResult, ModelResult, RejectedCandidate, Remainder, TraceResult, TraceVerdict};
 
+use super::changed_parameters;
 use super::verdict::not_examined;
-use super::{changed_parameters, model_result};
 
 /// A fitted model and its figures.
 #[derive(Clone)]
@@ -22,12 +21,18 @@ pub(super) struct Model<'m> {
 }
 
 impl<'m> Model<'m> {
-    /// With the held-out error of the fit.
+    /// Whose residual has structure or has none.
     ///
     /// # Errors
     /// If the model cannot be evaluated.
-    pub fn of(problem: &'m Problem, fit: &'m Fit) -> Result<Model<'m>, IdentifyError> {
-        Ok(Model { problem, fit, figures: model_result(problem, fit, fit.held_out.rms_mm)? })
+    pub fn of(
+        problem: &'m Problem,
+        fit: &'m Fit,
+        structured: bool,
+        judged_by: Option<JudgedBy<'_>>,
+    ) -> Result<Model<'m>, IdentifyError> {
+        let goodness = goodness(problem, fit).with_structure(structured);
+        Ok(Model { problem, fit, figures: fit::model(problem, fit, goodness, judged_by)? })
     }
 }
 
@@ -55,45 +60,30 @@ pub(in crate::result) struct Searched {
     pub presumed: Vec<String>,
 }
 
-/// The result with the declared model `before` and the model `after` with the found effects, which `effects` describes by
-/// the figures of that model.
-///
-/// # Errors
-/// If the model cannot be evaluated.
+/// The result with the declared model `before` and the model `after` with the found effects.
 pub(super) fn build(
     before: Model<'_>,
     after: Model<'_>,
     statements: Statements,
-    effects: impl FnOnce(&ModelResult) -> Result<Vec<EffectResult>, IdentifyError>,
-) -> Result<TraceResult, IdentifyError> {
-    let Model { problem, fit, mut figures } = after;
+    effects: Vec<EffectResult>,
+) -> TraceResult {
     let Statements { verdict, remainder, residual_before, rejected, candidates, interrupted, .. } = statements;
-    let determined = Determined::of(problem, &fit.rank)?;
-    let contradicted = noise::stated_against_repeats(problem, &fit.residuals);
-    figures.goodness = figures.goodness.with_structure(remainder.structured);
-    determined.mark(problem, &mut figures.parameters, figures.goodness);
-    let effects = effects(&figures)?;
     let mut warnings = before.problem.session.warnings.clone();
-    warnings.extend(noise::stated_against_repeats(before.problem, &before.fit.residuals));
+    warnings.extend(before.figures.outcome.contradicted_noise().map(str::to_string));
     warnings.extend(mislabelled_runs(&before.problem.tests));
-    warnings.extend(fit::assumptions(problem));
+    warnings.extend(fit::assumptions(after.problem));
     warnings.extend(statements.warnings);
     warnings.extend(plausibility::coefficients::warnings(before.problem, before.fit));
     let mut result = TraceResult {
-        reading_unit: problem.unit(),
-        verdict: verdict.gated(figures.goodness.verdict),
-        outcome: outcome::outcome(problem, fit, figures.goodness, &determined, contradicted),
+        reading_unit: after.figures.reading_unit,
+        noise_um: after.figures.noise_um,
+        verdict: verdict.gated(after.figures.outcome.goodness.verdict),
         interrupted: false,
         time_limit_s: None,
         unique: effects.iter().all(|effect| effect.unique),
-        noise_um: problem.noise.sigma_mm * 1e3,
-        noise_source: problem.noise.source,
-        noise_ar_coefficients: problem.noise.ar_coefficients.clone(),
-        readings: problem.readings(),
-        heldout_by: problem.folds.kind.words().to_string(),
-        changed_parameters: changed_parameters(&before.figures.parameters, &figures.parameters),
+        changed_parameters: changed_parameters(&before.figures.parameters, &after.figures.parameters),
         before: before.figures,
-        after: figures,
+        after: after.figures,
         effects,
         remainder,
         residual_before,
@@ -102,9 +92,6 @@ pub(super) fn build(
         candidates_detectable: candidates[1],
         families: statements.searched.families,
         presumed: statements.searched.presumed,
-        unobservable: fit::unobservable(problem, &fit.rank),
-        null_space: fit::null_space(problem, &fit.rank),
-        outliers: fit::outliers(problem, fit),
         conformity: None,
         plausibility: Plausibility::default(),
         warnings,
@@ -113,7 +100,7 @@ pub(super) fn build(
     if interrupted {
         result.mark_interrupted();
     }
-    Ok(result)
+    result
 }
 
 /// The declared model alone, without a verdict.
@@ -132,6 +119,6 @@ pub(crate) fn unsearched(problem: &Problem, fit: &Fit) -> Result<TraceResult, Id
         interrupted: false,
         warnings: Vec::new(),
     };
-    let declared = Model::of(problem, fit)?;
-    build(declared.clone(), declared, statements, |_| Ok(Vec::new()))
+    let declared = Model::of(problem, fit, false, None)?;
+    Ok(build(declared.clone(), declared, statements, Vec::new()))
 }

@@ -35,8 +35,10 @@ pub fn effect_name(machine: &Machine, effect: &Effect) -> EffectName {
 
 /// A found effect with the results that its report needs.
 pub(super) struct Found<'f> {
-    /// Index among the found effects.
+    /// Index among the effects of the model.
     pub number: usize,
+    /// Index among the effects that the search has selected.
+    pub selected: usize,
     /// Its candidate.
     pub candidate: usize,
     /// The model with the found effects and their aliases.
@@ -65,7 +67,7 @@ pub(super) fn result(
     found: &Found<'_>,
 ) -> Result<EffectResult, IdentifyError> {
     let (after, search) = (found.after, findings.search);
-    let taken = search.selected()[found.number];
+    let taken = search.selected()[found.selected];
     let candidate = &search.candidates[found.candidate];
     let number = found.number + findings.before.parameters.effects.len();
     let described = described(after, found.after_fit, number, found.parameters)?;
@@ -79,7 +81,7 @@ pub(super) fn result(
         family: families.get(candidate.family).map(|family| family.name.clone()).unwrap_or_default(),
         p_value: taken.p_value,
         rms_gain_um: found.rms_gain_um,
-        heldout_rms_um: held_out.um(found.number + 1),
+        heldout_rms_um: held_out.um(found.selected + 1),
         left_out_test_rms_um: found.predicted.found_um,
         aliases_left_out_test_rms_um: match found.predicted.found_um {
             Some(_) => found.predicted.aliases_um.clone(),
@@ -223,7 +225,7 @@ fn shape_parameters_of(problem: &Problem, effect: &Effect, of_positions: &[Optio
 }
 
 /// Effective number of parameters of an effect with a prior: `m − Σ C_jj/τ²`. `None` for an effect without one.
-fn effective_parameters(problem: &Problem, covariance: &Mat<f64>, effect: usize) -> Option<f64> {
+pub(crate) fn effective_parameters(problem: &Problem, covariance: &Mat<f64>, effect: usize) -> Option<f64> {
     let mut effective = 0.0;
     for (j, parameter) in problem.parameters.list.iter().enumerate() {
         match (parameter.role, parameter.prior) {

@@ -9,17 +9,18 @@ mod rejected;
 mod verdict;
 
 use abbe_identify::error::IdentifyError;
-use abbe_identify::fit::outcome::{self, Determined};
-use abbe_identify::fit::{self, Fit, prepare_with};
-use abbe_identify::heldout::cross_validation;
+use abbe_identify::fit::{self, Fit, JudgedBy, prepare_with};
+use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
-use abbe_identify::results::{ChangedParameter, EffectResult, ModelResult, OfAngles, ParameterResult, TraceResult};
+use abbe_identify::results::{ChangedParameter, EffectResult, ParameterResult, TraceResult};
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::words::listed;
+use faer::prelude::Solve;
+use faer::{Mat, Side};
 
 use super::alias::{self, Alias, CompetingEffect};
-use super::judge::noise_is_from_search;
+use super::judge::{noise_is_from_search, with_noise_of_fit};
 use super::remainder::Structure;
 use super::state::{ALL, SearchState};
 use crate::candidates::gain::Projected;
@@ -28,11 +29,14 @@ use crate::constants::MORE_PROBABLE;
 pub(super) use build::unsearched;
 use build::{Model, Searched, Statements, build};
 pub use effect::effect_name;
+pub(super) use effect::effective_parameters;
 pub(super) use poses::{PosesEnded, outcome_of_poses};
 use verdict::verdict;
 
 /// Share of a signal that remains beside the declared model below which the model contains it.
 const CONTAINED: f64 = 0.01;
+/// Decrease of χ² up to which an effect explains nothing: that of one coefficient of 2 standard uncertainties.
+const EXPLAINS_NOTHING: f64 = 4.0;
 
 /// The end state of a search.
 pub(super) struct TraceFindings<'f> {
@@ -70,8 +74,12 @@ pub(super) struct ReportedEffect {
 /// The result, and for each effect its aliases and the best competing effects.
 pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, IdentifyError> {
     let TraceFindings { before, before_fit, search, .. } = findings;
-    let before_result = before_result(findings)?;
-    let held_out = HeldOut::of(search, before_result.heldout_rms_um);
+    // On the readings that are not excluded after the search.
+    let by_last = Some(JudgedBy { readings: findings.after, heldout_mm: None });
+    let of_fit = with_noise_of_fit(before, before_fit)?;
+    let (declared, declared_fit) = of_fit.as_ref().map_or((*before, *before_fit), |(problem, fit)| (problem, fit));
+    let declared = Model::of(declared, declared_fit, false, by_last)?;
+    let held_out = HeldOut::of(search, declared.figures.heldout_rms_um);
     let mut alias_effects: Vec<Vec<Effect>> = Vec::new();
     let mut competing_effects = Vec::new();
     let mut gains = Vec::new();
@@ -90,7 +98,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
         let mut of_tests = prediction::predictions(findings, k, &mut aliases)?;
         competing_effects.push(of_effect);
         let assumed = assumed(findings, taken.candidate, &aliases);
-        let place = assumed.unwrap_or_else(|| most_probable(&aliases, &of_tests));
+        let place = assumed.unwrap_or_else(|| most_probable(search, taken.candidate, &aliases, &of_tests));
         let found = place.map_or(taken.candidate, |place| exchange(taken.candidate, place, &mut aliases));
         match (place, assumed) {
             // The left-out tests were predicted with the other effect in the model.
@@ -115,29 +123,45 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
         variants.push(each.map(variants_of).collect::<Vec<_>>());
         gains.push(model.gain(taken.candidate)?.gain);
     }
-    let (after, after_fit) = with_aliases(findings, &chosen_candidates, &covered)?;
-    let (after, after_fit) = (&after, &after_fit);
-    let after_result = model_result(after, after_fit, held_out.last_um() * 1e-3)?;
-    let (verdict, remainder) = verdict(findings, !search.selected().is_empty());
-    let families = library::families()?;
-    let effects = |figures: &ModelResult| -> Result<Vec<EffectResult>, IdentifyError> {
-        let result = |k: usize| {
-            let reported = effect::Found {
-                number: k,
-                candidate: chosen_candidates[k].0,
-                after,
-                after_fit,
-                parameters: &figures.parameters,
-                rms_gain_um: (gains[k] / held_out.rows).sqrt() * before.noise.sigma_mm * 1e3,
-                alias_effects: &alias_effects[k],
-                costs: &costs[k],
-                variants: &variants[k],
-                predicted: &predicted[k],
-            };
-            effect::result(findings, &families, &held_out, &reported)
-        };
-        (0..alias_effects.len()).map(result).collect()
+    let mut kept: Vec<usize> = (0..chosen_candidates.len()).collect();
+    let (mut after, mut after_fit) = match kept.is_empty() {
+        true => (declared.problem.clone(), declared.fit.clone()),
+        false => with_aliases(findings, &chosen_candidates, &covered, &kept)?,
     };
+    // An explanation that takes the place of an effect may leave nothing to another one.
+    let explains = |k: &usize| explained(&after, &after_fit, before.parameters.effects.len() + k) > EXPLAINS_NOTHING;
+    let explaining: Vec<usize> = kept.iter().copied().filter(explains).collect();
+    if explaining.len() < kept.len() {
+        kept = explaining;
+        (after, after_fit) = with_aliases(findings, &chosen_candidates, &covered, &kept)?;
+        let mut place = 0..;
+        alias_effects.retain(|_| place.next().is_some_and(|k| kept.contains(&k)));
+        let mut place = 0..;
+        competing_effects.retain(|_| place.next().is_some_and(|k| kept.contains(&k)));
+    }
+    let (after, after_fit) = (&after, &after_fit);
+    let (verdict, remainder) = verdict(findings, !kept.is_empty());
+    let of_search = Some(JudgedBy { readings: after, heldout_mm: Some(held_out.last_um() * 1e-3) });
+    let found = Model::of(after, after_fit, remainder.structured, of_search)?;
+    let families = library::families()?;
+    let result = |(number, k): (usize, &usize)| {
+        let k = *k;
+        let reported = effect::Found {
+            number,
+            selected: k,
+            candidate: chosen_candidates[k].0,
+            after,
+            after_fit,
+            parameters: &found.figures.parameters,
+            rms_gain_um: (gains[k] / held_out.rows).sqrt() * before.noise.sigma_mm * 1e3,
+            alias_effects: &alias_effects[number],
+            costs: &costs[k],
+            variants: &variants[k],
+            predicted: &predicted[k],
+        };
+        effect::result(findings, &families, &held_out, &reported)
+    };
+    let effects: Vec<EffectResult> = kept.iter().enumerate().map(result).collect::<Result<_, _>>()?;
     let mut warnings = not_assumed(findings, after);
     warnings.extend(findings.warnings.iter().cloned());
     let statements = Statements {
@@ -150,9 +174,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
         interrupted: findings.interrupted,
         warnings,
     };
-    let declared = Model { problem: before, fit: before_fit, figures: before_result };
-    let found = Model { problem: after, fit: after_fit, figures: after_result };
-    let result = build(declared, found, statements, effects)?;
+    let result = build(declared, found, statements, effects);
     let (after, after_fit) = (after.clone(), after_fit.clone());
     Ok(ReportedEffect { after, after_fit, result, alias_effects, competing_effects })
 }
@@ -256,62 +278,6 @@ fn relative_variance(residuals: &[Vec<f64>], sigma_mm: f64, rows: usize) -> f64 
     (sum / rows.max(1) as f64).max(1.0)
 }
 
-/// The declared model, on the readings that are not excluded after the search.
-fn before_result(findings: &TraceFindings<'_>) -> Result<ModelResult, IdentifyError> {
-    let (before, fit, after) = (findings.before, findings.before_fit, findings.after);
-    let result = model_result(before, fit, fit.held_out.rms_mm)?;
-    if before.rejected == after.rejected {
-        return Ok(result);
-    }
-    let (rms, held_out, of_angles) = fit::rms_of_units(after, &fit.residuals, &fit.held_out.residuals);
-    let [rms_um, heldout_rms_um] = [rms, held_out].map(|mm| mm * 1e3);
-    let in_3d = |rms: f64| result.rms_3d_um.map(|_| rms * 3.0_f64.sqrt());
-    let cross_validation = cross_validation(before, fit, heldout_rms_um * 1e-3, after)?;
-    Ok(ModelResult {
-        rms_um,
-        heldout_rms_um,
-        of_angles,
-        rms_3d_um: in_3d(rms_um),
-        heldout_rms_3d_um: in_3d(heldout_rms_um),
-        cross_validation,
-        ..result
-    })
-}
-
-pub(super) fn model_result(problem: &Problem, fit: &Fit, held_out_mm: f64) -> Result<ModelResult, IdentifyError> {
-    let vectors = problem.are_vectors();
-    let (rms, held, of_angles) = fit::rms_of_units(problem, &fit.residuals, &fit.held_out.residuals);
-    // Of lengths and angles: each part of the held-out error of the search in the proportion of the last fit.
-    let held = if of_angles.is_some() { held * held_out_mm / fit.held_out.rms_mm } else { held_out_mm };
-    let of_angles = of_angles.map(|angles| OfAngles {
-        heldout_rms_arcsec: angles.heldout_rms_arcsec * held_out_mm / fit.held_out.rms_mm,
-        ..angles
-    });
-    let [rms, held] = [rms, held].map(|mm| mm * 1e3);
-    let in_3d = |rms: f64| vectors.then(|| rms * 3.0_f64.sqrt());
-    let goodness = outcome::goodness(problem, fit);
-    let mut parameters = fit::parameters(problem, fit);
-    Determined::of(problem, &fit.rank)?.mark(problem, &mut parameters, goodness);
-    Ok(ModelResult {
-        reading_unit: problem.unit(),
-        of_angles,
-        cross_validation: cross_validation(problem, fit, held * 1e-3, problem)?,
-        rms_um: rms,
-        heldout_rms_um: held,
-        rms_3d_um: in_3d(rms),
-        heldout_rms_3d_um: in_3d(held),
-        noise_um: problem.noise.sigma_mm * 1e3,
-        rank: fit.rank.identifiable_basis.ncols(),
-        parameter_count: fit.beta.len(),
-        chi_square: fit.chi_square,
-        degrees_of_freedom: fit.degrees_of_freedom,
-        goodness,
-        identifiable: fit::ids(problem, &parameters),
-        covariance: fit::covariance_of_parameters(problem, fit, &parameters),
-        parameters,
-    })
-}
-
 /// Warnings about explanations that the user accepts and that explain no effect.
 fn not_assumed(findings: &TraceFindings<'_>, after: &Problem) -> Vec<String> {
     let assumed: Vec<String> = after.parameters.effects.iter().filter(|one| one.assumed).map(Effect::id).collect();
@@ -328,10 +294,18 @@ fn assumed(findings: &TraceFindings<'_>, found: usize, aliases: &[Alias]) -> Opt
     aliases.iter().position(|alias| is_assumed(alias.candidate)).map(Some)
 }
 
-/// The place of the alias that is more probable than the found effect, and that predicts left-out tests no worse.
-fn most_probable(aliases: &[Alias], of_tests: &prediction::Predictions) -> Option<usize> {
+/// The place of the alias that is more probable than the found effect, and that predicts left-out tests no worse. A staircase
+/// takes no place of a shape with fewer steps: with enough steps it approximates any shape.
+fn most_probable(
+    search: &SearchState<'_>,
+    found: usize,
+    aliases: &[Alias],
+    of_tests: &prediction::Predictions,
+) -> Option<usize> {
     let ratio = |place: &usize| aliases[*place].ln_probability_ratio();
+    let steps = |candidate: usize| search.effect(candidate).shape.positions().len();
     (0..aliases.len())
+        .filter(|place| steps(aliases[*place].candidate) <= steps(found).max(1))
         .filter(|place| aliases[*place].variant_of.is_none() && ratio(place) > MORE_PROBABLE)
         .filter(|place| !of_tests.is_worse(*place))
         .max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
@@ -360,7 +334,7 @@ fn exchange(found: usize, place: usize, aliases: &mut Vec<Alias>) -> usize {
 }
 
 /// The model with the found effects, which now have their aliases: uncertainties cover these, unless the effect is
-/// assumed. `chosen` is the candidate of each effect, and whether the user accepts it.
+/// assumed. `chosen` is the candidate of each effect, and whether the user accepts it; those that are `kept` are in the model.
 ///
 /// # Errors
 /// If an alias cannot be evaluated, or the model with an accepted alias cannot be fitted.
@@ -368,19 +342,21 @@ fn with_aliases(
     findings: &TraceFindings<'_>,
     chosen: &[(usize, bool)],
     alias_effects: &[Vec<Effect>],
+    kept: &[usize],
 ) -> Result<(Problem, Fit), IdentifyError> {
     let search = findings.search;
-    let effects: Vec<Effect> = (chosen.iter().zip(alias_effects))
-        .map(|((candidate, assumed), aliases)| Effect {
-            aliases: aliases.clone(),
-            assumed: *assumed,
-            ..search.effect(*candidate).clone().with_estimated_numbers()
+    let effects: Vec<Effect> = (kept.iter())
+        .map(|k| Effect {
+            aliases: alias_effects[*k].clone(),
+            assumed: chosen[*k].1,
+            ..search.effect(chosen[*k].0).clone().with_estimated_numbers()
         })
         .collect();
-    let as_found = search.selected().iter().zip(chosen).all(|(found, chosen)| found.candidate == chosen.0);
+    let as_found = kept.len() == search.selected().len()
+        && search.selected().iter().zip(chosen).all(|(found, chosen)| found.candidate == chosen.0);
     if !as_found {
         let (mut after, mut fitted) = prepare_with(&findings.before.session, &effects, findings.seed)?;
-        if noise_is_from_search(findings.before, &after) {
+        if noise_is_from_search(&findings.before.noise, &after.noise) {
             after.noise = findings.before.noise.clone();
             fitted = fit::refit(&mut after, &fitted)?;
         }
@@ -394,6 +370,20 @@ fn with_aliases(
     }
     fitted.aliases = fit::aliases_at_solution(&after, &fitted.beta)?;
     Ok((after, fitted))
+}
+
+/// What an effect explains in addition to the rest of the model: the increase of χ² of readings and priors without it,
+/// `bᵀ C⁻¹ b` with the covariance `C` of its coefficients `b`.
+fn explained(problem: &Problem, fit: &Fit, number: usize) -> f64 {
+    let list = &problem.parameters.list;
+    let own = |j: &usize| matches!(list[*j].role, Role::Coefficient { effect, .. } if effect == number);
+    let own: Vec<usize> = (0..list.len()).filter(own).collect();
+    let size = |k: usize| list[own[k]].size;
+    let covariance = Mat::from_fn(own.len(), own.len(), |i, k| fit.covariance[(own[i], own[k])] / (size(i) * size(k)));
+    let b = Mat::from_fn(own.len(), 1, |k, _| fit.beta[own[k]] / size(k));
+    // Without a covariance of full rank nothing is said against the effect.
+    let Ok(factor) = covariance.llt(Side::Lower) else { return f64::INFINITY };
+    (b.transpose() * factor.solve(&b))[(0, 0)]
 }
 
 /// Parameters that changed by more than their standard uncertainty.

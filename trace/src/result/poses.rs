@@ -2,16 +2,13 @@
 
 use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::Fit;
-use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
-use abbe_identify::results::{EffectResult, ModelResult};
+use abbe_identify::results::EffectResult;
 use abbe_model::effect::Effect;
-use faer::prelude::Solve;
-use faer::{Mat, Side};
 
 use super::effect::{described, explained_by};
 use super::verdict::of_poses;
-use super::{Model, Searched, Statements, build, residual_before};
+use super::{Model, Searched, Statements, build, explained, residual_before};
 use crate::poses::{AcceptedEffect, PoseSearch};
 use crate::remainder::Structure;
 use crate::{SearchStep, TraceOutcome};
@@ -41,19 +38,18 @@ pub(crate) fn outcome_of_poses(
     let [structure_before, structure_after] = ended.structures;
     let (verdict, remainder) = of_poses(true, ended.stopped_early, structure_after.as_ref(), found.last_p_value);
     let declared = before.parameters.effects.len();
-    let effects = |figures: &ModelResult| -> Result<Vec<EffectResult>, IdentifyError> {
-        let result = |(k, accepted): (usize, &AcceptedEffect)| {
-            let described = described(&after, &after_fit, declared + k, &figures.parameters)?;
-            Ok(EffectResult {
-                family: accepted.group.to_string(),
-                p_value: accepted.p_value,
-                heldout_rms_um: accepted.heldout_rms_mm * 1e3,
-                rms_gain_um: rms_gain_mm(&after, &after_fit, declared + k) * 1e3,
-                ..with_aliases(described, &after, accepted)
-            })
-        };
-        accepted.iter().enumerate().map(result).collect()
+    let with_effects = Model::of(&after, &after_fit, remainder.structured, None)?;
+    let effect = |(k, accepted): (usize, &AcceptedEffect)| -> Result<EffectResult, IdentifyError> {
+        let described = described(&after, &after_fit, declared + k, &with_effects.figures.parameters)?;
+        Ok(EffectResult {
+            family: accepted.group.to_string(),
+            p_value: accepted.p_value,
+            heldout_rms_um: accepted.heldout_rms_mm * 1e3,
+            rms_gain_um: rms_gain_mm(&after, &after_fit, declared + k) * 1e3,
+            ..with_aliases(described, &after, accepted)
+        })
     };
+    let effects: Vec<EffectResult> = accepted.iter().enumerate().map(effect).collect::<Result<_, _>>()?;
     let steps = (accepted.iter().enumerate())
         .map(|(k, accepted)| SearchStep {
             id: accepted.effect.id(),
@@ -71,7 +67,7 @@ pub(crate) fn outcome_of_poses(
         interrupted: found.interrupted,
         warnings: ended.warnings,
     };
-    let result = build(Model::of(before, before_fit)?, Model::of(&after, &after_fit)?, statements, effects)?;
+    let result = build(Model::of(before, before_fit, false, None)?, with_effects, statements, effects);
     let count = accepted.len();
     let aliases_of = |accepted: &AcceptedEffect| accepted.aliases.iter().map(|alias| alias.effect.clone()).collect();
     Ok(TraceOutcome {
@@ -95,17 +91,8 @@ fn with_aliases(of_effect: EffectResult, problem: &Problem, accepted: &AcceptedE
     explained_by(of_effect, problem, &accepted.effect, &aliases, &costs)
 }
 
-/// Rms of what an effect explains in addition to the rest of the model, mm: the increase of the sum of squares of
-/// readings and priors without the effect, `bᵀ C⁻¹ b` with the covariance `C` of its coefficients.
+/// Rms of what an effect explains in addition to the rest of the model, mm.
 fn rms_gain_mm(problem: &Problem, fit: &Fit, number: usize) -> f64 {
-    let list = &problem.parameters.list;
-    let own = |j: &usize| matches!(list[*j].role, Role::Coefficient { effect, .. } if effect == number);
-    let own: Vec<usize> = (0..list.len()).filter(own).collect();
-    let size = |k: usize| list[own[k]].size;
-    let covariance = Mat::from_fn(own.len(), own.len(), |i, k| fit.covariance[(own[i], own[k])] / (size(i) * size(k)));
-    let b = Mat::from_fn(own.len(), 1, |k, _| fit.beta[own[k]] / size(k));
-    let Ok(factor) = covariance.llt(Side::Lower) else { return 0.0 };
-    let increase = (b.transpose() * factor.solve(&b))[(0, 0)];
-    let rows = problem.scalars().max(1) as f64;
-    (increase.max(0.0) / rows).sqrt() * problem.noise.likelihood_mm()
+    let increase = Some(explained(problem, fit, number)).filter(|increase| increase.is_finite());
+    (increase.unwrap_or(0.0).max(0.0) / problem.scalars().max(1) as f64).sqrt() * problem.noise.likelihood_mm()
 }

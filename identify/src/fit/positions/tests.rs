@@ -54,6 +54,14 @@ fn fitted(problem: &Problem, at: &[f64]) -> (f64, Vec<f64>) {
     (moved.sum_of_squares(&beta), beta)
 }
 
+/// Each estimated position is a number that the readings determine.
+#[test]
+fn positions_count_in_the_degrees_of_freedom() {
+    let problem = problem();
+    let [without, with] = [&problem, &with_steps(&problem, &AT)].map(|problem| fit(problem, None).unwrap());
+    assert_eq!(without.degrees_of_freedom - with.degrees_of_freedom, 2 * AT.len());
+}
+
 /// Full fits with a step inside and outside of an end of its interval: χ² has risen by less and by more than the
 /// quantile. The intervals contain the true positions.
 #[test]
