@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use crate::plant::recipe::TrueValue;
 use crate::plant::{AxisName, Component, Driver, Freedom, Injected, Kind, Recipe, Shape};
 use crate::suite::{abbe, text};
 
@@ -21,15 +22,24 @@ fn compared(inputs: [&Path; 2]) -> (Value, String) {
     (serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap(), String::from_utf8(run.stdout).unwrap())
 }
 
+/// The same machine, while the position of A in Z drifts by 40 µm.
+fn drifting(clean: &Recipe) -> Recipe {
+    let position = Component::Location(Freedom::Z, AxisName::A);
+    clean.clone().with(Injected::new(position, Driver::Time, Shape::Drift, 40.0))
+}
+
+fn succeeds(arguments: &[&str]) {
+    let run = abbe(arguments);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+}
+
 /// The machine is the same in both sessions; the second one drifts while it is measured.
 #[test]
 fn a_session_that_hides_a_drift_judges_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    let drift = Component::Location(Freedom::Z, AxisName::A);
     let clean = Recipe::new(Kind::Rotary, 11).readings(600);
-    let drifting = clean.clone().with(Injected::new(drift, Driver::Time, Shape::Drift, 40.0));
     let before = written(folder.path(), "before", &clean, &[]);
-    let after = written(folder.path(), "after", &drifting, &[]);
+    let after = written(folder.path(), "after", &drifting(&clean), &[]);
     let (found, screen) = compared([&before, &after]);
     assert_eq!(found["pairs"][0]["judged"], false);
     assert_eq!(found["statements"]["good"]["not_judged"], serde_json::json!([text(&after)]));
@@ -42,9 +52,44 @@ fn a_session_that_hides_a_drift_judges_nothing() {
     assert!(screen.contains(&command), "{screen}");
     // A model of the session says so too.
     let model = folder.path().join("model.json");
-    assert!(abbe(&["fit", text(&after), "--save", text(&model), "--quiet"]).status.success());
+    succeeds(&["fit", text(&after), "--save", text(&model), "--quiet"]);
     let (found, _) = compared([&before, &model]);
     assert_eq!(found["pairs"][0]["judged"], false);
+}
+
+/// The printed command traces the session that hides a drift. Errors and bars are the same in both sessions, and the balls are
+/// mounted again: the drift alone differs.
+#[test]
+fn a_session_whose_drift_is_traced_differs_by_the_drift_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let clean = Recipe::new(Kind::Rotary, 15).readings(600);
+    let truth = clean.draw().truth;
+    let stays = |own: &&TrueValue| !own.is_setup || own.id.starts_with("bar");
+    let kept: Vec<(&str, f64)> = truth.unknowns.iter().filter(stays).map(|own| (&*own.id, own.value)).collect();
+    let before = written(folder.path(), "before", &clean, &[]);
+    let after = written(folder.path(), "after", &Recipe { seed: 16, ..drifting(&clean) }, &kept);
+    let traced = after.with_file_name("traced.toml");
+    let (_, screen) = compared([&before, &after]);
+    let command = ["trace", text(&after), "--write", text(&traced)];
+    assert!(screen.contains(&format!("abbe {} ", command.join(" "))), "{screen}");
+    succeeds(&command);
+    let (found, screen) = compared([&before, &traced]);
+    let differences = found["differences"].as_array().unwrap();
+    let significant: Vec<&Value> = differences.iter().filter(|own| own["significant"] == true).collect();
+    let [drift] = significant[..] else { panic!("{screen}") };
+    assert_eq!(drift["id"], "EZ0A~time:drift", "{screen}");
+    let um_per_h = 40.0 * 3600.0 / clean.plan().instants.last().unwrap().time_s;
+    let [value, u] = ["value", "u"].map(|key| drift[key].as_f64().unwrap());
+    assert!((value - um_per_h).abs() < 3.0 * u, "{um_per_h}: {drift}");
+    // Of saved models too.
+    let models = [&before, &after].map(|session| {
+        let model = session.with_file_name("model.json");
+        succeeds(&["trace", text(session), "--save", text(&model), "--quiet"]);
+        model
+    });
+    let (found, screen) = compared([&models[0], &models[1]]);
+    let pair = &found["pairs"][0];
+    assert_eq!((&pair["judged"], &pair["significant"]), (&true.into(), &0.into()), "{screen}");
 }
 
 /// A machine before and after its correction: what changed is not what to correct, and the volumetric error falls.

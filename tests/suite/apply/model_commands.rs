@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde_json::Value;
 
 use crate::suite::{abbe, ready, text};
@@ -135,6 +136,74 @@ fn poses_are_reached_and_corrected() {
     }
     assert_eq!(found[1][column("state")], "not-reachable");
     assert_eq!(found[2][column("state")], "not-reachable");
+}
+
+/// The joints of `sessions/pose/machine.toml`: axis and origin, mm. The axes of J4, J5 and J6 meet.
+const JOINTS: [(usize, [f64; 3]); 6] = [
+    (2, [0.0; 3]),
+    (1, [150.0, 0.0, 500.0]),
+    (1, [150.0, 0.0, 1200.0]),
+    (0, [150.0, 0.0, 1300.0]),
+    (1, [850.0, 0.0, 1300.0]),
+    (0, [950.0, 0.0, 1300.0]),
+];
+
+/// How such a robot carries its tool at these joints, degrees, with J3 higher by `lift_mm`.
+fn carried(joints_deg: &[f64], lift_mm: f64) -> Isometry3<f64> {
+    let joints = JOINTS.iter().zip(joints_deg).enumerate();
+    joints.fold(Isometry3::identity(), |frame, (number, ((axis, origin), deg))| {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::ith_axis(*axis), deg.to_radians());
+        let lift = Translation3::new(0.0, 0.0, if number == 2 { lift_mm } else { 0.0 });
+        frame * lift * Isometry3::rotation_wrt_point(turn, Point3::from(*origin))
+    })
+}
+
+/// A robot with a spherical wrist reaches each pose of a smooth path in two ways. The first row follows the stated positions,
+/// each further one its predecessor, over more than one block of rows; and the robot with its errors stands at the poses.
+#[test]
+fn a_path_of_poses_keeps_the_branch_of_its_joints() {
+    let folder = folder();
+    let [model, poses, out] = ["model.json", "poses.csv", "corrected.csv"].map(|name| folder.path().join(name));
+    success(&abbe(&["fit", text(&ready("pose/session.toml")), "--save", text(&model), "--quiet"]));
+    let saved: Value = serde_json::from_str(&std::fs::read_to_string(&model).unwrap()).unwrap();
+    let error = |id: &str| {
+        let found = saved["parameters"].as_array().unwrap().iter().find(|parameter| parameter["id"] == id);
+        found.map_or(0.0, |parameter| parameter["internal"].as_f64().unwrap())
+    };
+    let zeros_deg = ["EC0J1", "EB0J2", "EB0J3", "EA0J4", "EB0J5", "EA0J6"].map(|id| error(id).to_degrees());
+    let tool = Point3::new(950.0, 0.0, 1300.0);
+    let path = |k: usize| {
+        let (sin, cos) = (k as f64 * std::f64::consts::TAU / 2500.0).sin_cos();
+        [40.0 * sin, -20.0 + 15.0 * cos, 10.0 + 20.0 * sin, 60.0 + 30.0 * sin, 45.0 + 20.0 * cos, 100.0 * sin]
+    };
+    let turned = |[a, b, c, d, e, f]: [f64; 6]| [a, b, c, d - 180.0, -e, f - 180.0];
+    let mut rows_of_poses = "px_mm,py_mm,pz_mm,qw,qx,qy,qz\n".to_string();
+    for k in 0..2500 {
+        let (pose, other) = (carried(&path(k), 0.0), carried(&turned(path(k)), 0.0));
+        assert!((pose.inverse() * other * tool - tool).norm() < 1e-9 && pose.rotation.angle_to(&other.rotation) < 1e-7);
+        let (point, turn) = (pose * tool, pose.rotation.quaternion());
+        let cells = [point.x, point.y, point.z, turn.w, turn.i, turn.j, turn.k].map(|cell| format!("{cell:.12}"));
+        rows_of_poses += &(cells.join(",") + "\n");
+    }
+    std::fs::write(&poses, rows_of_poses).unwrap();
+    let seed = ["--at", "J4=-120", "--at", "J5=-65", "--at", "J6=-180"];
+    for (seed, is_turned) in [(&seed[..0], false), (&seed[..], true)] {
+        let run = ["compensate", text(&model), text(&poses), "--out", text(&out), "--tool-mm", "950,0,1300"];
+        success(&abbe(&[&run[..], seed, &["--quiet"]].concat()));
+        let (header, found) = rows(&out);
+        let place = header.iter().position(|name| name.eq_ignore_ascii_case("j1_deg")).unwrap();
+        assert_eq!(found.len(), 2500);
+        for (k, row) in found.iter().enumerate() {
+            let joints: Vec<f64> = row[place..place + 6].iter().map(|cell| cell.parse().unwrap()).collect();
+            let wanted = if is_turned { turned(path(k)) } else { path(k) };
+            // The errors are some hundred arcseconds; the other branch is 90 degrees away.
+            let near = joints.iter().zip(wanted).all(|(found, wanted)| (found - wanted).abs() < 1.0);
+            assert!(near, "row {k}: {row:?}, {wanted:?} expected");
+            let actual: Vec<f64> = joints.iter().zip(zeros_deg).map(|(joint, zero)| joint + zero).collect();
+            let off = (carried(&actual, error("EZ0J3")) * tool - carried(&wanted, 0.0) * tool).norm();
+            assert!(off < 1e-5, "row {k}: {off:e} mm");
+        }
+    }
 }
 
 #[test]

@@ -37,10 +37,23 @@ pub mod trace_reported;
 pub mod tracker_blunders;
 pub mod validate_command;
 
+use std::path::Path;
+
 use abbe::files::{self, ReadOptions};
 use abbe::model::session::Session;
+use serde_json::Value;
 
 use crate::plant::{Plan, Recipe};
+use crate::suite::{abbe, text};
+
+/// The result of a command on a session, and what it prints.
+pub fn result_and_screen(command: &str, session: &Path, more: &[&str]) -> (Value, String) {
+    let json = session.with_file_name(format!("{command}.json"));
+    let run = abbe(&[&[command, text(session), "--json", text(&json)], more].concat());
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let screen = String::from_utf8_lossy(&run.stdout).into_owned() + &String::from_utf8_lossy(&run.stderr);
+    (serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap(), screen)
+}
 
 /// A session in a folder, after a change of the lines of its data files: name of the test, number of the line, cells.
 pub fn session_of(recipe: &Recipe, plan: &Plan, change: impl Fn(&str, usize, &mut Vec<String>)) -> Session {

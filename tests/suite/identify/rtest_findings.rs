@@ -232,6 +232,33 @@ fn squareness_and_cyclic_straightness_of_y_are_found_in_bk1() {
     }
 }
 
+/// Not of the paper: a table with a worm, at steps of 1°. Orders 1 and 3 of its wheel, and 72 and 144 of its worm, are found, the
+/// last at 2.5 readings a cycle, and no wave of another axis or period takes their place.
+#[test]
+fn the_orders_of_a_worm_are_found_and_no_other_wave() {
+    let waves = [(1, 6.0), (3, 0.8), (72, 4.0), (144, 1.5)];
+    let tests = [bk2(), c_alone()].map(|own| Test { step_deg: 1.0, traversals: 2, ..own });
+    let harmonic =
+        |(order, arcsec)| motion(Freedom::C, AxisName::C, Shape::Harmonic { order, phase_deg: 25.0 }, arcsec);
+    let effects = waves.map(harmonic).to_vec();
+    traced(&session(NestOn::Table, tests.to_vec(), errors_of(AxisName::C), effects), |outcome| {
+        let found = &outcome.result.effects;
+        assert_eq!(found.len(), waves.len(), "{found:#?}");
+        for (order, arcsec) in waves {
+            let is_wave = |own: &&EffectResult| {
+                let name = &own.name;
+                let of_c = (&*name.component, &*name.driver, &*name.shape) == ("ECC", "C", "harmonic");
+                of_c && name.order == Some(f64::from(order))
+            };
+            let wave = found.iter().find(is_wave).unwrap_or_else(|| panic!("order {order}: {found:#?}"));
+            for (estimate, truth) in wave.parameters.iter().zip([arcsec, 25.0]) {
+                assert!((estimate.value - truth).abs() < 4.0 * estimate.u, "{estimate:?}");
+            }
+        }
+        assert_eq!(outcome.result.verdict, TraceVerdict::Explained);
+    });
+}
+
 /// BK2 with nothing undeclared.
 pub fn bk2_without_effects(on: NestOn) -> Session {
     session(on, vec![bk2()], errors_of(AxisName::C), Vec::new())

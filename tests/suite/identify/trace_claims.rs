@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 
 use abbe::files::{self, ReadOptions};
-use abbe::identify::results::{EffectResult, TraceResult};
+use abbe::identify::results::{EffectName, EffectResult, TraceResult};
 use abbe::model::session::Session;
 use abbe::trace::{TraceOptions, trace};
 use rand::SeedableRng;
@@ -12,8 +12,9 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::plant::machine::Machine;
 use crate::plant::noise::normal;
-use crate::plant::{AxisName, Component, Driver, Freedom, Injected, Kind, Plan, Recipe, Shape};
-use crate::suite::identify::{session_of, with_length};
+use crate::plant::{AxisName, Component, Driver, Freedom, Injected, Kind, Oracle, Plan, Recipe, Shape};
+use crate::suite::identify::{result_and_screen, session_of, with_length};
+use crate::suite::text;
 
 const C: Driver = Driver::Axis(AxisName::C);
 
@@ -88,6 +89,43 @@ fn shapes_with_the_same_readings_are_one_explanation() {
     }
 }
 
+/// A wave of nearly the period of a harmonic is a variant of its entry, and is not counted: by the simulator their readings
+/// differ by less than a tenth of the noise.
+#[test]
+fn a_wave_of_nearly_one_turn_is_a_variant_of_the_harmonic() {
+    let truth = harmonic(Freedom::B, 1, 3.0);
+    let recipe = Recipe::new(Kind::Rotary, 6).with(truth.clone());
+    let oracle = Oracle::new(&recipe);
+    let folder = tempfile::tempdir().unwrap();
+    recipe.draw().write(folder.path()).unwrap();
+    let (found, screen) = result_and_screen("trace", &folder.path().join("session.toml"), &["--all"]);
+    let effect = &found["effects"][0];
+    let aliases = effect["aliases"].as_array().unwrap();
+    let count = 1 + aliases.len();
+    assert_eq!(effect["explanation_count"], count, "{screen}");
+    assert!(screen.contains(&format!("\n1 of {count} indistinguishable explanations: ")), "{screen}");
+    let mut waves = 0;
+    for entry in std::iter::once(effect).chain(aliases) {
+        let variants = entry["variants"].as_array().into_iter().flatten();
+        for variant in variants.filter(|own| own["shape"] == "periodic") {
+            let period = variant["meaning"].as_str().unwrap().split("repeating every ").nth(1).unwrap();
+            let period = period.trim_end_matches('°').parse().unwrap();
+            let order = entry["order"].as_u64().unwrap_or_else(|| panic!("{entry:#}")) as u32;
+            let component = Component::parse(entry["component"].as_str().unwrap()).unwrap();
+            let shapes = [Shape::Periodic { period, phase_deg: 0.0 }, Shape::Harmonic { order, phase_deg: 0.0 }];
+            // How far the best of each is from the truth. They are no further apart than the sum.
+            let missed = shapes.map(|shape| {
+                let share = oracle.explained_share(&truth, &Injected::new(component, C, shape, 1.0));
+                oracle.strength_sigma(&truth) * (1.0 - share * share).sqrt()
+            });
+            let of_noise = missed.iter().sum::<f64>() / (oracle.plan.instants.len() as f64).sqrt();
+            assert!(of_noise < 0.1, "{of_noise}: {entry:#}");
+            waves += 1;
+        }
+    }
+    assert!(waves > 0, "{screen}");
+}
+
 /// What one reading alone shows after each reversal within a run decays in no width that the readings have: no spike is named for
 /// it.
 #[test]
@@ -135,15 +173,21 @@ fn the_most_probable_explanation_is_named() {
     }
 }
 
+/// A tilt of constant amount, in arcsec, whose direction turns with the table or, of a negative order, against it.
+fn precession(order: i32, amplitude: f64) -> [Injected; 2] {
+    let sideways_deg = if order < 0 { 120.0 } else { -60.0 };
+    [(Freedom::A, 30.0), (Freedom::B, sideways_deg)].map(|(freedom, phase_deg)| {
+        let shape = Shape::Harmonic { order: order.unsigned_abs(), phase_deg };
+        Injected::new(motion(freedom, AxisName::C), C, shape, amplitude)
+    })
+}
+
 /// A tilt of constant amount whose direction turns against the table reads as a motion along its axis: each is named beside the
 /// other.
 #[test]
 fn a_precession_is_an_explanation_of_a_machine_tool() {
-    for (order, seed) in [(3, 15), (4, 16)] {
-        let tilt = |freedom, phase_deg| {
-            Injected::new(motion(freedom, AxisName::C), C, Shape::Harmonic { order, phase_deg }, 1.5)
-        };
-        let recipe = Recipe::new(Kind::Rotary, seed).with(tilt(Freedom::A, 30.0)).with(tilt(Freedom::B, 120.0));
+    for (order, seed) in [(-3, 15), (-4, 16)] {
+        let recipe = Recipe { effects: precession(order, 1.5).to_vec(), ..Recipe::new(Kind::Rotary, seed) };
         let result = traced(&session_of(&recipe, &recipe.plan(), |_, _, _| {}));
         let explained = |effect: &EffectResult| {
             std::iter::once(&effect.name)
@@ -154,6 +198,89 @@ fn a_precession_is_an_explanation_of_a_machine_tool() {
         // A tilt that turns twice per turn with the table is constant in the frame in which the readings show it.
         let presumed = "EA0C and EB0C presume that there is no EAC~C:precession1 or EAC~C:precession2";
         assert!(result.presumed.iter().any(|own| own == presumed), "{:#?}", result.presumed);
+    }
+}
+
+/// A precession of amount a and phase φ lifts a ball at x = −R sin C, y = R cos C by R a cos((n ± 1) C + φ), the upper sign
+/// against the table: with one radius the axial motion is named, and the precession beside it. With two radii the precession is.
+#[test]
+fn a_precession_has_its_order_amplitude_and_phase() {
+    const AMOUNT_ARCSEC: f64 = 2.0;
+    let is_truth = |effect: &EffectResult, amplitude: f64| {
+        let mut pairs = effect.parameters.iter().zip([amplitude, 30.0]);
+        effect.parameters.len() == 2 && pairs.all(|(own, truth)| (own.value - truth).abs() < 3.0 * own.u)
+    };
+    let recipe_of =
+        |order, seed| Recipe { effects: precession(order, AMOUNT_ARCSEC).to_vec(), ..Recipe::new(Kind::Rotary, seed) };
+    for (order, seed) in [(-3_i32, 17), (4, 18)] {
+        let recipe = recipe_of(order, seed);
+        let result = traced(&session_of(&recipe, &recipe.plan(), |_, _, _| {}));
+        assert_eq!(named(&result), [format!("EZC~C:harmonic{}", (order - 1).abs())]);
+        let axial = &result.effects[0];
+        let lifted_um = 100e3 * (AMOUNT_ARCSEC / 3600.0).to_radians();
+        assert!(is_truth(axial, lifted_um), "{lifted_um}: {:#?}", axial.parameters);
+        let mut beside = axial.aliases.iter().flat_map(|alias| std::iter::once(&alias.name).chain(&alias.variants));
+        let is_it = |name: &EffectName| {
+            (&*name.component, &*name.shape, name.order) == ("EAC", "precession", Some(f64::from(order)))
+        };
+        assert!(beside.any(is_it), "{:#?}", axial.aliases);
+    }
+    for (order, seed) in [(-3, 19), (-4, 20)] {
+        let recipe = recipe_of(order, seed);
+        let mut tests = Kind::Rotary.tests(recipe.step_deg);
+        tests.extend(Kind::rotary_at(60.0, recipe.step_deg).split_off(2));
+        let plan = Plan::of_tests(Kind::Rotary, Machine::default(), tests, false);
+        let result = traced(&session_of(&recipe, &plan, |_, _, _| {}));
+        assert_eq!(named(&result), [format!("EAC~C:precession{order}")]);
+        assert!(is_truth(&result.effects[0], AMOUNT_ARCSEC), "{:#?}", result.effects[0].parameters);
+    }
+}
+
+/// A drift takes the estimates of the balls far beyond their priors. With the drift found nothing contradicts the session, on
+/// screen, page and in JSON, and all errors are those of the simulator.
+#[test]
+fn a_conflict_that_the_found_effect_removes_is_not_claimed() {
+    let drift = Injected::new(Component::Location(Freedom::Z, AxisName::A), Driver::Time, Shape::Drift, 40.0);
+    let recipe = Recipe { shared_mounts: true, ..Recipe::new(Kind::Rotary, 41).readings(600) }.with(drift);
+    let (plan, folder) = (recipe.plan(), tempfile::tempdir().unwrap());
+    let drawn = recipe.draw_on(&plan);
+    drawn.write(folder.path()).unwrap();
+    let [file, page] = ["session.toml", "page.html"].map(|name| folder.path().join(name));
+    let (fitted, screen) = result_and_screen("fit", &file, &[]);
+    assert_eq!(fitted["statements"]["measure"]["step"], "correct-session", "{screen}");
+    assert!(screen.contains("nothing before the session is corrected"), "{screen}");
+    let (found, screen) = result_and_screen("trace", &file, &["--all", "--report", text(&page)]);
+    assert_eq!(found["verdict"], "explained", "{screen}");
+    // The declared model has one χ², by the stated noise, although the repeats give the search another one.
+    for key in ["chi_square", "noise_um", "degrees_of_freedom"] {
+        let [of_fit, before] = [&fitted[key], &found["before"][key]].map(|value| value.as_f64().unwrap());
+        assert!((before / of_fit - 1.0).abs() < 1e-6, "{key}: {of_fit} and {before}");
+    }
+    assert_ne!(found["statements"]["measure"]["step"], "correct-session", "{screen}");
+    for key in ["conflicts", "suggestions"] {
+        assert!(found[key].as_array().is_none_or(Vec::is_empty), "{key}: {}", found[key]);
+    }
+    for shown in [&screen, &std::fs::read_to_string(&page).unwrap()] {
+        assert!(!shown.contains("contradict") && !shown.contains("session is corrected"), "{screen}");
+    }
+    let um_per_h = 40.0 * 3600.0 / plan.instants.last().unwrap().time_s;
+    let truth = drawn.truth.piges().map(|(id, value, _)| (id, value)).chain([("EZ0A~time:drift", um_per_h)]);
+    let parameters = found["after"]["parameters"].as_array().unwrap();
+    for (id, truth) in truth {
+        let parameter = parameters.iter().find(|own| own["id"] == id).unwrap_or_else(|| panic!("{id}: {screen}"));
+        let [value, u] = ["value", "u"].map(|key| parameter[key].as_f64().unwrap());
+        assert!((value - truth).abs() < 4.0 * u, "{truth}: {parameter}");
+    }
+}
+
+/// A tilt of C once per turn that is ten times its uncertainty: an axial motion twice per turn explains the readings as well. A
+/// staircase with as many numbers as it likes does not take its place.
+#[test]
+fn no_staircase_takes_the_place_of_a_wave() {
+    for seed in [4, 5, 23, 24] {
+        let recipe = Recipe::new(Kind::Rotary, seed).readings(1500).with(harmonic(Freedom::B, 1, 1.2));
+        let found = named(&traced(&session_of(&recipe, &recipe.plan(), |_, _, _| {})));
+        assert!(!found.is_empty() && found.iter().all(|id| !id.contains("steps")), "seed {seed}: {found:?}");
     }
 }
 

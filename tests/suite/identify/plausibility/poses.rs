@@ -12,7 +12,8 @@ use abbe::model::session::Session;
 use abbe::trace::{TraceOptions, trace};
 use test_needs::data;
 
-use crate::suite::ready;
+use crate::suite::identify::targets::{POSES, TARGETS, written};
+use crate::suite::{abbe, ready, text};
 
 /// One pose in so many is read.
 const EACH: usize = 40;
@@ -184,4 +185,38 @@ fn the_order_of_a_quaternion_is_named() {
         Err(error) => error.to_string(),
     };
     assert!(told.contains("scalar first"), "{told}");
+}
+
+/// Poses of an independent chain whose measured positions are in inches, in mm where inches are stated, or whose columns of
+/// two joints are exchanged: the message says so.
+#[test]
+fn inches_and_exchanged_columns_of_poses_are_named() {
+    let header = "j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg,px_mm,py_mm,pz_mm";
+    let of_inches = header.replace("px_mm,py_mm,pz_mm", "px_in,py_in,pz_in");
+    let exchanged = header.replace("j2_deg,j3_deg", "j3_deg,j2_deg");
+    for (columns, scale, words) in [
+        (header, 1.0, ""),
+        (header, 1.0 / 25.4, "the measured positions are in inches, not in mm"),
+        (of_inches.as_str(), 1.0, "the measured positions are in mm, not in inches"),
+        (exchanged.as_str(), 1.0, "the columns of J2 and J3 are exchanged"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let file = written(folder.path(), POSES, 1, &TARGETS, [0.0; 2]);
+        for number in 0..TARGETS.len() {
+            let table = folder.path().join(format!("{number}.csv"));
+            let rows = std::fs::read_to_string(&table).unwrap();
+            let scaled = rows.lines().skip(1).map(|line| {
+                let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+                let cells = cells.iter().enumerate().map(|(k, cell)| if k < 6 { *cell } else { cell * scale });
+                cells.map(|cell| format!("{cell:.9}")).collect::<Vec<_>>().join(",")
+            });
+            let rows = std::iter::once(columns.to_string()).chain(scaled).collect::<Vec<_>>().join("\n");
+            std::fs::write(&table, rows + "\n").unwrap();
+        }
+        let run = abbe(&["fit", text(&file), "--quiet"]);
+        let told = String::from_utf8_lossy(&run.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+        let is_named = !words.is_empty() && told.contains(&format!("explained if {words}"));
+        assert!(is_named || words.is_empty() && told.is_empty(), "{columns}: {told}");
+        assert_eq!(run.status.success(), words.is_empty(), "{columns}: {told}");
+    }
 }
