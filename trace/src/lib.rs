@@ -28,7 +28,7 @@
 //!
 //! let (problem, found) = fit::prepare(&session, 1)?;
 //! let declared = fit::report(&problem, &found)?;
-//! assert!((declared.rms_um - 0.548).abs() < 0.001);
+//! assert!((declared.model.rms_um - 0.548).abs() < 0.001);
 //!
 //! let options = TraceOptions { only: vec!["EZC".into()], draws: 99, ..TraceOptions::default() };
 //! let found = trace(&session, &options, &|_| true)?.result;
