@@ -440,31 +440,46 @@ mod tests {
         assert!(longest_increasing(&[]).is_empty());
     }
 
+    /// What is stated of 30 sessions of a machine with these values of EX0C, each with u = 0.6.
+    fn stated_of(value: impl Fn(usize) -> f64) -> HistoryStatements {
+        let session = |k: usize| {
+            let days = 30.0 * k as f64;
+            SessionValues {
+                days,
+                until_days: days,
+                file: format!("{k}"),
+                values: vec![Some((value(k), 0.6))],
+                covariance: vec![vec![0.36]],
+            }
+        };
+        let machine = MachineSessions {
+            machine_id: "M".into(),
+            parameters: vec![("EX0C".into(), "um".into(), String::new())],
+            determined: 1,
+            sessions: (0..30).map(session).collect(),
+            ..MachineSessions::default()
+        };
+        statements(&analyse(&[machine], &HistoryOptions::default()).machines)
+    }
+
+    /// Deviations of known size in place of noise.
+    const DEVIATIONS: [f64; 7] = [0.4, -0.7, 0.1, 0.9, -0.5, -0.2, 0.6];
+
+    /// Sessions that repeat each other to a thousandth of their uncertainty show a step that means nothing.
+    #[test]
+    fn a_step_below_its_uncertainty_is_not_stated() {
+        let step = |k: usize| if k < 15 { 0.0 } else { 10.0 };
+        let scaled = |scale: f64| stated_of(|k| scale * (step(k) + DEVIATIONS[k % 7]));
+        assert_eq!(scaled(1.0).correct.len() + scaled(1.0).changed.len(), 1);
+        let small = scaled(1e-3);
+        assert!(small.correct.is_empty() && small.changed.is_empty(), "{small:?}");
+    }
+
     /// A correction by 30 and a shift by 20 after it: each is stated with its own amount, whichever is the later.
     #[test]
     fn a_step_is_stated_where_its_event_belongs() {
         for (levels, corrected, shifted) in [([30.0, 0.0, 20.0], -30.0, 20.0), ([10.0, 30.0, 0.0], -30.0, 20.0)] {
-            let session = |k: usize| {
-                // Deviations of known size in place of noise.
-                let value = levels[k / 10] + [0.4, -0.7, 0.1, 0.9, -0.5, -0.2, 0.6][k % 7];
-                let days = 30.0 * k as f64;
-                SessionValues {
-                    days,
-                    until_days: days,
-                    file: format!("{k}"),
-                    values: vec![Some((value, 0.6))],
-                    covariance: vec![vec![0.36]],
-                }
-            };
-            let machine = MachineSessions {
-                machine_id: "M".into(),
-                parameters: vec![("EX0C".into(), "um".into(), String::new())],
-                determined: 1,
-                sessions: (0..30).map(session).collect(),
-                ..MachineSessions::default()
-            };
-            let history = analyse(&[machine], &HistoryOptions::default());
-            let stated = statements(&history.machines);
+            let stated = stated_of(|k| levels[k / 10] + DEVIATIONS[k % 7]);
             let amounts = |list: &[ChangedInHistory]| -> Vec<f64> {
                 list.iter().map(|own| own.shift.map_or(f64::NAN, |shift| shift.value)).collect()
             };

@@ -159,6 +159,7 @@ fn a_time_limit_ends_the_search_and_every_output_says_so() {
     let result = read(&json);
     assert_eq!((&result["interrupted"], &result["verdict"]), (&true.into(), &"incomplete".into()));
     assert_eq!(result["time_limit_s"], 1e-6);
+    assert_eq!(result["statements"]["measure"]["step"], "trace", "{result}");
     assert!(std::fs::read_to_string(&next).unwrap().contains(said));
     assert_eq!(run("600", &whole).status.code(), Some(0));
     let result = read(&whole);
