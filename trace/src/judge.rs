@@ -13,7 +13,6 @@ use super::state::SearchState;
 use crate::TraceOptions;
 use crate::candidates::columns::Columns;
 use crate::null::Draws;
-use crate::trace::null_draw_count;
 
 /// The refitted model with the selected effects, and the remaining structure.
 pub(super) struct RefittedModel {
@@ -125,7 +124,7 @@ pub(super) fn structure(
 ) -> Result<Structure, IdentifyError> {
     let columns = Columns::of_readings(problem);
     let start = Start::of(problem, &columns, fit)?;
-    let count = null_draw_count(options);
+    let count = options.null_draw_count();
     let (residuals, whitened, block) = (&fit.residuals, &start.residual, SINGLE);
     let draws = Draws { problem, columns: &columns, residuals, whitened, count, block, seed, progress: None };
     remainder::structure(problem, &start, &draws, should_continue)

@@ -9,7 +9,6 @@ use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 
 use super::TraceOptions;
-use super::poses::proposed_ids;
 use super::start::Start;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::columns::{Columns, EffectColumns};
@@ -80,14 +79,17 @@ pub(super) fn searched_candidates(
     Ok(found.filter_map(|(member, columns)| Some(Candidate::of(member, columns?))).collect())
 }
 
-/// A warning for each exclusion that matches no candidate.
-pub(super) fn unused_exclusions(problem: &Problem, options: &TraceOptions) -> Result<Vec<String>, IdentifyError> {
+/// A warning for each exclusion that matches no candidate. `in_groups` are the identifiers of the effects that are
+/// proposed in groups beside them.
+pub(super) fn unused_exclusions(
+    problem: &Problem,
+    options: &TraceOptions,
+    in_groups: &[String],
+) -> Result<Vec<String>, IdentifyError> {
     let candidates = library::candidates(problem)?;
-    let is_of_poses = problem.folds.kind.is_poses();
-    let families = if is_of_poses { proposed_ids(problem) } else { Vec::new() };
-    let in_families = |text: &&String| families.iter().any(|id| id.contains(text.as_str()));
+    let is_in_groups = |text: &&String| in_groups.iter().any(|id| id.contains(text.as_str()));
     Ok(matching_no_candidate(&candidates, &options.exclude)
-        .filter(|text| !in_families(text))
+        .filter(|text| !is_in_groups(text))
         .map(|text| format!("`{text}` excludes nothing: no candidate of this session has it in its identifier"))
         .collect())
 }

@@ -65,6 +65,14 @@ impl Default for TraceOptions {
     }
 }
 
+impl TraceOptions {
+    /// The number of null draws: the requested number, but at least as many as the significance level needs.
+    pub(crate) fn null_draw_count(&self) -> usize {
+        let least = (1.0 / self.significance.max(1e-6)).ceil() as usize;
+        self.draws.max(least - 1)
+    }
+}
+
 /// One addition of the search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SearchStep {
@@ -98,6 +106,31 @@ pub struct TraceOutcome {
     pub(crate) strongest: Option<Effect>,
     /// The result as it is reported.
     pub result: TraceResult,
+}
+
+impl TraceOutcome {
+    /// A trace that was interrupted before its search began. It contains the declared model only.
+    pub(super) fn unsearched(problem: Problem, fit: Fit) -> Result<TraceOutcome, IdentifyError> {
+        let mut result = result::unsearched(&problem, &fit)?;
+        result.mark_interrupted();
+        Ok(TraceOutcome::of_declared(problem, fit, result))
+    }
+
+    /// A trace that contains the declared model only, with its result.
+    pub(super) fn of_declared(problem: Problem, fit: Fit, result: TraceResult) -> TraceOutcome {
+        TraceOutcome {
+            after: problem.clone(),
+            after_fit: fit.clone(),
+            before: problem,
+            before_fit: fit,
+            effects: Vec::new(),
+            alias_effects: Vec::new(),
+            competing_effects: Vec::new(),
+            steps: Vec::new(),
+            strongest: None,
+            result,
+        }
+    }
 }
 
 /// Finds the unmodelled effects behind the residual of a session.
@@ -294,7 +327,7 @@ fn trace_or_interrupted(
         let ended = PosesEnded {
             stopped_early: found.effects.len() >= policy.max_effects,
             structures: [before?, after?],
-            warnings: screening::unused_exclusions(problem, options)?,
+            warnings: screening::unused_exclusions(problem, options, &poses::proposed_ids(problem))?,
         };
         return result::outcome_of_poses(problem, before_fit, found, ended);
     }
@@ -302,7 +335,7 @@ fn trace_or_interrupted(
     let start = Start::of(problem, &readings, before_fit)?;
     interrupt.check()?;
     let null = |block: usize| {
-        let (count, seed, progress) = (null_draw_count(options), options.seed, Some(progress));
+        let (count, seed, progress) = (options.null_draw_count(), options.seed, Some(progress));
         let (columns, whitened) = (&readings, start.residual.as_slice());
         Draws { problem, columns, residuals: pure, whitened, count, block, seed, progress }
     };
@@ -376,7 +409,7 @@ fn trace_or_interrupted(
         interrupted,
         candidates: candidate_count,
         candidates_seen: observable,
-        warnings: screening::unused_exclusions(problem, options)?,
+        warnings: screening::unused_exclusions(problem, options, &[])?,
     })?;
     drop(search);
     drop(columns);
@@ -405,14 +438,8 @@ fn structure_of_poses(
 ) -> Result<Option<Structure>, IdentifyError> {
     let columns = Columns::new(problem, &fit.beta);
     let start = Start::of(problem, &columns, fit)?;
-    let (count, seed) = (null_draw_count(options), options.seed.wrapping_add(2));
+    let (count, seed) = (options.null_draw_count(), options.seed.wrapping_add(2));
     let (residuals, whitened, block) = (&fit.residuals, &start.residual, SINGLE);
     let draws = Draws { problem, columns: &columns, residuals, whitened, count, block, seed, progress: None };
     Ok(neighbours::structure(problem, &columns, start.model.as_ref().as_ref(), &start.residual, draws.draws()))
-}
-
-/// The number of null draws: the requested number, but at least as many as the significance level needs.
-pub(crate) fn null_draw_count(options: &TraceOptions) -> usize {
-    let least = (1.0 / options.significance.max(1e-6)).ceil() as usize;
-    options.draws.max(least - 1)
 }
