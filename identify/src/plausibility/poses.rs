@@ -4,6 +4,7 @@
 use std::collections::HashSet;
 
 use abbe_model::axis::AxisKind;
+use abbe_model::instrument::MisreadingKind;
 use abbe_model::session::limits::MIN_UM;
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
@@ -169,7 +170,12 @@ fn of_poses(session: &Session) -> Vec<Hypothesis> {
         for misreading in measured.map_or(&[][..], |test| test.station.misreadings()) {
             let reread = changed(&|_, values| (misreading.reread)(values));
             let words = misreading.words.to_string();
-            list.push(Hypothesis::new(SuggestionKind::ColumnsExchanged, misreading.columns, words, reread));
+            let kind = match misreading.kind {
+                MisreadingKind::Sign => SuggestionKind::ColumnSign,
+                MisreadingKind::Unit => SuggestionKind::ColumnUnit,
+                MisreadingKind::Order => SuggestionKind::ColumnsExchanged,
+            };
+            list.push(Hypothesis::new(kind, misreading.columns, words, reread));
         }
     }
     let scaled = |axes: &[usize], factor: f64| {

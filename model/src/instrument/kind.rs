@@ -190,8 +190,21 @@ impl Checked<'_> {
     }
 }
 
+/// In what respect columns are misread.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MisreadingKind {
+    /// A column has the opposite sign.
+    Sign,
+    /// Columns have another unit.
+    Unit,
+    /// Columns have another order, or follow another convention.
+    Order,
+}
+
 /// A way in which files of an instrument are misread.
 pub struct Misreading {
+    /// In what respect.
+    pub kind: MisreadingKind,
     /// The columns.
     pub columns: &'static str,
     /// What would explain the readings, after "if": a clause.
@@ -306,7 +319,7 @@ pub trait Instrument {
     fn mirror(&self, values: &mut [f64]) {
         let _ = values;
     }
-    /// Orders of its columns that are taken for one another, beside signs and units.
+    /// Ways in which its columns are misread, beside the unit of lengths and a mirrored frame.
     fn misreadings(&self) -> &'static [Misreading] {
         &[]
     }

@@ -12,7 +12,7 @@ mod parameter;
 pub mod set_up;
 pub mod stand;
 
-pub use kind::{Checked, Entry, Fault, Geometry, Group, Instrument, InstrumentPoint, Misreading};
+pub use kind::{Checked, Entry, Fault, Geometry, Group, Instrument, InstrumentPoint, Misreading, MisreadingKind};
 pub use operation::{Aligned, Contact, Following, Handling, Travel};
 pub use parameter::{InstrumentParameter, InternalUnit, SharedBy};
 

@@ -20,9 +20,9 @@ use super::channel::Channel;
 use super::column::{Column, OF_ROTATION, Quantity};
 use super::set_up::{self, SetUp};
 use super::stand::{self, Stand, pose_error};
-use super::{Aligned, Travel, 
-    Entry, Fault, Geometry, Group, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Misreading, Reading, SharedBy, Station,
-    default_errors, displaced, point,
+use super::{
+    Aligned, Entry, Fault, Geometry, Group, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint,
+    Misreading, MisreadingKind, Reading, SharedBy, Station, Travel, default_errors, displaced, point,
 };
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
@@ -60,7 +60,13 @@ pub(super) const ENTRY: Entry = Entry {
     reads_poses: true,
     rows_can_lack_channels: true,
     default_errors: default_errors::all_locations,
-    ..Entry::new(InstrumentKind::Pose, ["pose", "poses of a body at the tool"], &PARAMETERS, schema::properties::<Keys>, read)
+    ..Entry::new(
+        InstrumentKind::Pose,
+        ["pose", "poses of a body at the tool"],
+        &PARAMETERS,
+        schema::properties::<Keys>,
+        read,
+    )
 };
 
 const POSITION: [Channel; 3] = Channel::vector(["x", "y", "z"]);
@@ -165,23 +171,26 @@ fn commanded(machine: &Machine, state: &[AxisPosition<f64>]) -> Matrix3<f64> {
 
 /// One channel has the opposite sign.
 const fn negated<const CHANNEL: usize>(columns: &'static str, words: &'static str) -> Misreading {
-    Misreading { columns, words, reread: |values| values[CHANNEL] = -values[CHANNEL] }
+    Misreading { kind: MisreadingKind::Sign, columns, words, reread: |values| values[CHANNEL] = -values[CHANNEL] }
 }
 
 /// Quaternions are written with the scalar first or last, poses and rotations in either direction, and three angles by many
 /// conventions.
 const MISREADINGS: [Misreading; 15] = [
     Misreading {
+        kind: MisreadingKind::Order,
         columns: "qx, qy, qz, qw",
         words: "the quaternions have the scalar first: their columns are qw, qx, qy, qz in this order",
         reread: |values| reordered(values, [1, 2, 3, 0]),
     },
     Misreading {
+        kind: MisreadingKind::Order,
         columns: "qx, qy, qz, qw",
         words: "the quaternions have the scalar last: their columns are qx, qy, qz, qw in this order",
         reread: |values| reordered(values, [3, 0, 1, 2]),
     },
     Misreading {
+        kind: MisreadingKind::Order,
         columns: "the pose",
         words: "the poses are the inverse ones: of the instrument in the frame of the body, not of the body in that of the \
                 instrument",
@@ -193,6 +202,7 @@ const MISREADINGS: [Misreading; 15] = [
         },
     },
     Misreading {
+        kind: MisreadingKind::Order,
         columns: "the rotation",
         words: "the rotations are the inverse ones",
         reread: |values| values[OF_ROTATION].iter_mut().for_each(|value| *value = -*value),
@@ -200,30 +210,35 @@ const MISREADINGS: [Misreading; 15] = [
     negated::<0>("px", "px has the opposite sign, and the rotations have not"),
     negated::<1>("py", "py has the opposite sign, and the rotations have not"),
     negated::<2>("pz", "pz has the opposite sign, and the rotations have not"),
-    negated::<3>("rx", "the component X of the rotation has the opposite sign"),
-    negated::<4>("ry", "the component Y of the rotation has the opposite sign"),
-    negated::<5>("rz", "the component Z of the rotation has the opposite sign"),
+    negated::<3>("rx, qx", "the component X of the rotation has the opposite sign (column rx or qx)"),
+    negated::<4>("ry, qy", "the component Y of the rotation has the opposite sign (column ry or qy)"),
+    negated::<5>("rz, qz", "the component Z of the rotation has the opposite sign (column rz or qz)"),
     Misreading {
+        kind: MisreadingKind::Order,
         columns: "rx, ry, rz",
         words: "rx, ry, rz are roll, pitch and yaw about fixed axes X, Y, Z, not a rotation vector",
         reread: |values| turned(values, |[x, y, z]| [(2, z), (1, y), (0, x)]),
     },
     Misreading {
+        kind: MisreadingKind::Order,
         columns: "rx, ry, rz",
         words: "rx, ry, rz are angles about X, Y, Z as they turn, not a rotation vector",
         reread: |values| turned(values, |[x, y, z]| [(0, x), (1, y), (2, z)]),
     },
     Misreading {
+        kind: MisreadingKind::Order,
         columns: "rx, ry, rz",
         words: "rx, ry, rz are the angles A, B, C about Z, Y, X as they turn, not a rotation vector",
         reread: |values| turned(values, |[a, b, c]| [(2, a), (1, b), (0, c)]),
     },
     Misreading {
+        kind: MisreadingKind::Unit,
         columns: "rx, ry, rz",
         words: "rx, ry, rz are in radians, not in degrees",
         reread: |values| values[OF_ROTATION].iter_mut().for_each(|value| *value = value.to_degrees()),
     },
     Misreading {
+        kind: MisreadingKind::Unit,
         columns: "rx, ry, rz",
         words: "rx, ry, rz are in degrees, not in radians",
         reread: |values| values[OF_ROTATION].iter_mut().for_each(|value| *value = value.to_radians()),
@@ -234,7 +249,8 @@ const MISREADINGS: [Misreading; 15] = [
 fn turned(values: &mut [f64], turns: fn([f64; 3]) -> [(usize, f64); 3]) {
     let [x, y, z] = std::array::from_fn(|k| values[OF_ROTATION.start + k]);
     let about = |(axis, angle): (usize, f64)| UnitQuaternion::from_scaled_axis(Vector3::ith(axis, angle));
-    let product = turns([x, y, z]).map(about).into_iter().fold(UnitQuaternion::identity(), |product, turn| product * turn);
+    let product =
+        turns([x, y, z]).map(about).into_iter().fold(UnitQuaternion::identity(), |product, turn| product * turn);
     values[OF_ROTATION].copy_from_slice(product.scaled_axis().as_slice());
 }
 
@@ -375,7 +391,10 @@ impl Instrument for Pose<f64> {
         for (station, readings) in &group.tests {
             if let Station::Pose(Pose { stand, .. }) = station {
                 let turns = orientations(group.machine, readings);
-                sum += turns.iter().map(|[of, measured]| (stand.matrix() * of).transpose() * measured).sum::<Matrix3<f64>>();
+                sum += turns
+                    .iter()
+                    .map(|[of, measured]| (stand.matrix() * of).transpose() * measured)
+                    .sum::<Matrix3<f64>>();
             }
         }
         Some(Station::Pose(Pose { turn: Some(quaternion(stand::best_rotation(sum, &present))), ..self.clone() }))
