@@ -7,6 +7,7 @@
 //! - a residual of a hundred times the noise in every test, or of less than a tenth of the stated noise;
 //! - poses of which the model explains less than 99 % of the variance (`poses`);
 //! - orientations of poses of which the model leaves more than 3°;
+//! - poses that a machine explains whose links differ from the stated ones, where the stated ones fit another reading of the file;
 //! - axes more than 5 % of the link beside their place, or tilted by 0.05 rad, and zero angles above 10°, of poses
 //!   (`locations`).
 //!
@@ -39,6 +40,9 @@ const MIN_EXPLAINED: f64 = 0.99;
 const MAX_TURNED: f64 = 3.0 * std::f64::consts::PI / 180.0;
 /// Below this share, mistakes that explain more are searched.
 const WELL_EXPLAINED: f64 = 0.9999;
+/// They are searched too if the nominal machine leaves more than this share of the spread of the poses: errors of 5 mm and 1° of
+/// every joint leave 0.02.
+const FAR_FROM_NOMINAL: f64 = 0.1;
 /// The readings are those of another session if the residual of every test is this many times the noise.
 const ANOTHER_SESSION: f64 = 100.0;
 /// Mistakes are searched if the residual is this many times the noise.
@@ -71,19 +75,7 @@ fn by_instrument(problem: &Problem, fit: &Fit) -> Plausibility {
     let suggestions = suggest::suggestions(problem, &conflicts, pulls.allowed());
     if by_residual && let Some(best) = suggestions.first() {
         let rms_um = rms_mm(problem, &fit.residuals) * 1e3;
-        conflicts.push(Conflict {
-            kind: ConflictKind::Statement,
-            subject: "session".to_string(),
-            value: rms_um,
-            stated: best.rms_um,
-            unit: "um".to_string(),
-            pull: None,
-            words: format!(
-                "the session leaves a residual of {}; with one statement changed it leaves {}",
-                problem.unit().text(rms_um, 3),
-                problem.unit().text(best.rms_um, 3)
-            ),
-        });
+        conflicts.push(statement(problem, "session", rms_um, best));
     }
     Plausibility { conflicts, suggestions, explained_variance: None }
 }
@@ -212,6 +204,23 @@ fn one_clause(clauses: &[&str]) -> String {
     parts.join(" ")
 }
 
+/// One statement changed lowers the residual, µm, that the session or the nominal machine leaves.
+fn statement(problem: &Problem, left_by: &str, rms_um: f64, best: &Suggestion) -> Conflict {
+    Conflict {
+        kind: ConflictKind::Statement,
+        subject: "session".to_string(),
+        value: rms_um,
+        stated: best.rms_um,
+        unit: "um".to_string(),
+        pull: None,
+        words: format!(
+            "the {left_by} leaves a residual of {}; with one statement changed it leaves {}",
+            problem.unit().text(rms_um, 3),
+            problem.unit().text(best.rms_um, 3)
+        ),
+    }
+}
+
 /// A residual of a hundred times the noise in every test.
 fn residual(problem: &Problem, fit: &Fit) -> Option<Conflict> {
     let noise = problem.noise.sigma_mm;
@@ -324,10 +333,16 @@ fn of_poses(problem: &Problem, fit: &Fit) -> Plausibility {
     let locations = locations::conflicts(problem, fit);
     let of_angles = rms_by_unit_mm(problem, &fit.residuals)[1].map(|mm| mm / problem.session.lever_mm);
     let turned = of_angles.filter(|rad| *rad > MAX_TURNED);
-    let is_searched = explained < WELL_EXPLAINED || turned.is_some() || !locations.is_empty();
+    let is_contradicted = explained < WELL_EXPLAINED || turned.is_some() || !locations.is_empty();
+    // Links of another shape may explain all, as where every joint has the opposite sign.
+    let is_far = |left: &poses::Left| left.share > FAR_FROM_NOMINAL;
+    let nominal = if is_contradicted { None } else { poses::left_by_nominal(problem).filter(is_far) };
+    let is_searched = is_contradicted || nominal.is_some();
     let suggestions = if is_searched { poses::suggestions(problem) } else { Vec::new() };
     let little = explained < MIN_EXPLAINED;
-    let mut conflicts = if little || !suggestions.is_empty() {
+    let mut conflicts = if let (Some(nominal), Some(best)) = (nominal, suggestions.first()) {
+        vec![statement(problem, "nominal machine", nominal.rms_mm * 1e3, best)]
+    } else if little || !suggestions.is_empty() {
         vec![Conflict {
             kind: ConflictKind::ExplainedVariance,
             subject: "session".to_string(),

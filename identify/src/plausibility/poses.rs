@@ -72,50 +72,67 @@ pub(super) fn spread_mm2(problem: &Problem) -> Option<f64> {
     (spread > (MIN_UM * 1e-3).powi(2) && spread.is_finite()).then_some(spread)
 }
 
+/// The nominal machine before some of the poses: only the set-up is unknown.
+fn nominal(problem: &Problem) -> Session {
+    let mut nominal = thinned(problem, MAX_POSES);
+    nominal.unknowns.clear();
+    nominal.effects.clear();
+    nominal
+}
+
 /// The misfit of the nominal machine: see [`super::nominal_misfit`].
 pub(super) fn nominal_misfit(session: &Session) -> Option<f64> {
     let noise = Noise::white(NOISE_MM, NoiseSource::Stated);
-    let mut nominal = thinned(&Problem::new(session, noise.clone(), 1).ok()?, MAX_POSES);
-    nominal.unknowns.clear();
-    nominal.effects.clear();
+    let nominal = nominal(&Problem::new(session, noise.clone(), 1).ok()?);
     let problem = Problem::new(&nominal, noise.clone(), 1).ok()?;
     Some(trial(&nominal, &noise)?.rms_mm / spread_mm2(&problem).map_or(1.0, f64::sqrt))
 }
 
+/// What a session leaves of its poses.
+pub(super) struct Left {
+    /// Share of the spread of the positions: readings that are scaled leave a residual that is scaled with them.
+    pub share: f64,
+    /// Residual over scalar readings, mm.
+    pub rms_mm: f64,
+}
+
+/// What the nominal machine leaves.
+pub(super) fn left_by_nominal(problem: &Problem) -> Option<Left> {
+    left(&nominal(problem))
+}
+
+/// Fits a session in which a turn of a radian weighs as much as the spread. The lever of a session that states no noise follows
+/// from the residual, and hides orientations that are misread; that of another unit of lengths hides positions.
+fn left(session: &Session) -> Option<Left> {
+    let noise = Noise::white(NOISE_MM, NoiseSource::Stated);
+    let spread_mm = spread_mm2(&Problem::new(session, noise.clone(), 1).ok()?).map(f64::sqrt);
+    let weighed = Session { lever_mm: spread_mm.unwrap_or(session.lever_mm), ..session.clone() };
+    let rms_mm = trial(&weighed, &noise)?.rms_mm;
+    Some(Left { share: rms_mm / spread_mm.unwrap_or(1.0), rms_mm })
+}
+
 /// The mistakes with which the nominal machine fits poses far better, the best first.
 pub(super) fn suggestions(problem: &Problem) -> Vec<Suggestion> {
-    let noise = Noise::white(NOISE_MM, NoiseSource::Stated);
-    let mut nominal = thinned(problem, MAX_POSES);
-    nominal.unknowns.clear();
-    nominal.effects.clear();
-    // A turn of a radian weighs as much as the spread. The lever of a session that states no noise follows from the residual,
-    // and hides orientations that are misread.
+    let mut nominal = nominal(problem);
     nominal.lever_mm = spread_mm2(problem).map_or(nominal.lever_mm, f64::sqrt);
-    let base_mm = trial(&nominal, &noise).map_or(f64::INFINITY, |found| found.rms_mm);
+    let base = left(&nominal).map_or(f64::INFINITY, |left| left.share);
     let hypotheses = of_poses(&nominal);
-    let found = parallel::map(hypotheses.len(), &|k| trial(&hypotheses[k].session, &noise));
-    let mut tried: Vec<(f64, Hypothesis)> =
-        found.into_iter().zip(hypotheses).filter_map(|(found, hypothesis)| Some((found?.rms_mm, hypothesis))).collect();
-    // Readings that are scaled leave a residual that is scaled with them: compare shares of the spread.
-    let share = |rms_mm: f64, session: &Session| {
-        let spread = Problem::new(session, noise.clone(), 1).ok().and_then(|problem| spread_mm2(&problem));
-        rms_mm / spread.unwrap_or(1.0).sqrt()
-    };
-    let base = share(base_mm, &nominal);
-    tried.iter_mut().for_each(|(rms_mm, hypothesis)| *rms_mm = share(*rms_mm, &hypothesis.session));
-    tried.retain(|(left, _)| *left * LOWERED < base);
-    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let found = parallel::map(hypotheses.len(), &|k| left(&hypotheses[k].session));
+    let mut tried: Vec<(Left, Hypothesis)> =
+        found.into_iter().zip(hypotheses).filter_map(|(found, hypothesis)| Some((found?, hypothesis))).collect();
+    tried.retain(|(left, _)| left.share * LOWERED < base);
+    tried.sort_by(|(a, _), (b, _)| a.share.total_cmp(&b.share));
     // Many tables have one convention.
     let mut seen = HashSet::new();
     tried.retain(|(_, hypothesis)| seen.insert(hypothesis.words.clone()));
-    let best = tried.first().map_or(0.0, |(left, _)| *left);
+    let best = tried.first().map_or(0.0, |(left, _)| left.share);
     (tried.into_iter())
-        .take_while(|(left, _)| *left <= best * NOT_SEPARABLE)
+        .take_while(|(left, _)| left.share <= best * NOT_SEPARABLE)
         .take(MAX_LISTED)
-        .map(|(_, hypothesis)| Suggestion {
+        .map(|(left, hypothesis)| Suggestion {
             kind: hypothesis.kind,
             subject: hypothesis.subject,
-            rms_um: trial(&hypothesis.session, &noise).map_or(0.0, |found| found.rms_mm * 1e3),
+            rms_um: left.rms_mm * 1e3,
             words: hypothesis.words,
         })
         .collect()

@@ -174,9 +174,14 @@ const fn negated<const CHANNEL: usize>(columns: &'static str, words: &'static st
     Misreading { kind: MisreadingKind::Sign, columns, words, reread: |values| values[CHANNEL] = -values[CHANNEL] }
 }
 
+/// Two channels are exchanged.
+const fn exchanged<const ONE: usize, const OTHER: usize>(columns: &'static str, words: &'static str) -> Misreading {
+    Misreading { kind: MisreadingKind::Order, columns, words, reread: |values| values.swap(ONE, OTHER) }
+}
+
 /// Quaternions are written with the scalar first or last, poses and rotations in either direction, and three angles by many
 /// conventions.
-const MISREADINGS: [Misreading; 15] = [
+const MISREADINGS: [Misreading; 21] = [
     Misreading {
         kind: MisreadingKind::Order,
         columns: "qx, qy, qz, qw",
@@ -213,6 +218,12 @@ const MISREADINGS: [Misreading; 15] = [
     negated::<3>("rx, qx", "the component X of the rotation has the opposite sign (column rx or qx)"),
     negated::<4>("ry, qy", "the component Y of the rotation has the opposite sign (column ry or qy)"),
     negated::<5>("rz, qz", "the component Z of the rotation has the opposite sign (column rz or qz)"),
+    exchanged::<0, 1>("px, py", "px and py are exchanged, and the rotations are not"),
+    exchanged::<1, 2>("py, pz", "py and pz are exchanged, and the rotations are not"),
+    exchanged::<0, 2>("px, pz", "px and pz are exchanged, and the rotations are not"),
+    exchanged::<3, 4>("rx, ry", "the components X and Y of the rotation are exchanged"),
+    exchanged::<4, 5>("ry, rz", "the components Y and Z of the rotation are exchanged"),
+    exchanged::<3, 5>("rx, rz", "the components X and Z of the rotation are exchanged"),
     Misreading {
         kind: MisreadingKind::Order,
         columns: "rx, ry, rz",

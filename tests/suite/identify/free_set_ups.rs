@@ -312,11 +312,23 @@ fn a_noise_that_is_not_stated_is_that_of_repeats_or_of_the_residual() {
 #[test]
 fn a_convention_that_explains_poses_is_named() {
     type Written = fn(Isometry3<f64>) -> ([f64; 3], [f64; 3]);
-    let written: [(&str, Written); 5] = [
+    let written: [(&str, Written); 8] = [
         ("as it is", as_it_is),
         ("inverse ones: of the instrument", |pose| as_it_is(pose.inverse())),
         ("rotations are the inverse ones", |pose| {
             (pose.translation.vector.into(), pose.rotation.inverse().scaled_axis().into())
+        }),
+        ("measured positions are 1,000 times too large", |pose| {
+            let (place, angles) = as_it_is(pose);
+            (place.map(|mm| 1e3 * mm), angles)
+        }),
+        ("py and pz are exchanged, and the rotations are not", |pose| {
+            let (place, angles) = as_it_is(pose);
+            ([place[0], place[2], place[1]], angles)
+        }),
+        ("the components X and Z of the rotation are exchanged", |pose| {
+            let (place, angles) = as_it_is(pose);
+            (place, [angles[2], angles[1], angles[0]])
         }),
         ("roll, pitch and yaw", |pose| {
             let (roll, pitch, yaw) = pose.rotation.euler_angles();
@@ -338,6 +350,26 @@ fn a_convention_that_explains_poses_is_named() {
             assert!(!told.contains("explained if"), "{told}");
         } else {
             assert!(told.contains(words), "{words}: {told}");
+        }
+    }
+}
+
+/// A machine whose links run to the other side explains readings in which every joint has the opposite sign, with no axis beside
+/// its place. The sign is named.
+#[test]
+fn the_opposite_sign_of_every_joint_is_named() {
+    for kind in [Kind::Tracker, Kind::Pose] {
+        for seed in 0..3 {
+            let folder = tempfile::tempdir().unwrap();
+            let mut session = Simulated::new(UR5E, seed).write(folder.path(), kind, 0.0, as_it_is);
+            let machine = Arc::make_mut(&mut session.machine);
+            machine.axes.iter_mut().for_each(|axis| axis.direction = axis.direction.map(|along| -along));
+            let told = match fitted(&session) {
+                Ok(found) => found.warnings.join("; "),
+                Err(error) => error.to_string(),
+            };
+            let words = "explained if the positions of J1, J2, J3, J4, J5, J6 have the opposite sign";
+            assert!(told.contains(words), "{kind:?}, {seed}: {told}");
         }
     }
 }
