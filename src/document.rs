@@ -6,12 +6,10 @@ use abbe_apply::compare::results::{Comparison, Difference};
 use abbe_files::SourceMap;
 use abbe_files::stamp::FileStamp;
 use abbe_identify::model_file::{InputFile, Provenance};
-use abbe_identify::problem::Problem;
 use abbe_identify::results::validation::{MovedParameter, ValidationResult};
 use abbe_identify::results::{FitResult, Statements, TraceResult, ValidationStatement};
+use abbe_plan::PlanStatement;
 use abbe_plan::results::{Contribution, PlanAnalysis};
-use abbe_plan::{PlanStatement, attainable};
-use abbe_trace::TraceOutcome;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -112,45 +110,6 @@ pub type StatedComparison<'r> = Stated<'r, Comparison, Statements<ComparisonStat
 /// A history with its statements.
 #[cfg(feature = "fleet")]
 pub type StatedHistory<'r> = Stated<'r, crate::fleet::history::FleetHistory, crate::fleet::history::HistoryStatements>;
-
-impl<'r> StatedFit<'r> {
-    /// Of a fit.
-    pub fn of_fit(problem: &Problem, result: &'r FitResult) -> Self {
-        let mut statements = Statements::of_fit(problem, result);
-        statements.measure.step = attainable(problem, statements.measure.step);
-        Stated { statements, result }
-    }
-}
-
-impl<'r> StatedTrace<'r> {
-    /// Of a trace.
-    pub fn of_trace(trace: &'r TraceOutcome) -> Self {
-        let mut statements = Statements::of_trace(&trace.after, &trace.result);
-        statements.measure.step = attainable(&trace.after, statements.measure.step);
-        Stated { statements, result: &trace.result }
-    }
-}
-
-impl<'r> StatedPlan<'r> {
-    /// Of a plan.
-    pub fn of_plan(problem: &Problem, result: &'r PlanAnalysis) -> Self {
-        Stated { statements: result.statements(problem), result }
-    }
-}
-
-impl<'r> StatedValidation<'r> {
-    /// Of a validation.
-    pub fn of_validation(result: &'r ValidationResult) -> Self {
-        Stated { statements: Statements::of_validation(result), result }
-    }
-}
-
-impl<'r> StatedComparison<'r> {
-    /// Of a comparison.
-    pub fn of_comparison(result: &'r Comparison) -> Self {
-        Stated { statements: result.statements(), result }
-    }
-}
 
 #[cfg(feature = "fleet")]
 impl<'r> StatedHistory<'r> {

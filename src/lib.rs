@@ -12,6 +12,7 @@
 //! | what a set of readings would say: identifiability, next test, poses | [`plan`] |
 //! | what follows from an identified model: correction, export, comparison, history | [`apply`] |
 //! | closed forms and their languages | [`codegen`] |
+//! | an analysis by its name: options → result → document, report, tables | [`analysis`] |
 //! | results as JSON documents, parameters of equations by name | [`document`], [`equation`] |
 //! | exports of a model | [`exports`] |
 //! | foreign files of readings as a session | [`import`] |
@@ -59,6 +60,8 @@ pub use abbe_model as model;
 pub use abbe_plan as plan;
 pub use abbe_trace as trace;
 
+#[doc(hidden)]
+pub mod analysis;
 pub mod certificate;
 pub mod document;
 pub mod equation;

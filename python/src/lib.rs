@@ -1,7 +1,7 @@
 //! The native part of the Python module `abbe`: handles on the library's types, NumPy arrays in and out, results as the
 //! JSON documents of the command. The package in `src/abbe` gives them their Python form.
 //!
-//! - [`machine`], [`session`], [`fit`], [`trace`], [`plan`], [`equation`], [`model`]: one file per handle;
+//! - [`machine`], [`session`], [`equation`], [`model`]: one file per handle; [`analysis`]: one for all results;
 //! - [`keywords`]: keywords as the keys of a session file; [`pickle`]: the state of a session;
 //! - [`work`]: computations without the GIL, with Ctrl-C, progress and a bound on the threads;
 //! - [`import`]: foreign files of readings; [`fleet`]: units of work of many sessions;
@@ -12,20 +12,17 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::todo)
 )]
 
-mod compare;
+mod analysis;
 mod equation;
 mod failed;
-mod fit;
 mod fleet;
 mod import;
 mod keywords;
 mod machine;
 mod model;
 mod pickle;
-mod plan;
 mod session;
 mod show;
-mod trace;
 mod work;
 
 use pyo3::prelude::*;
@@ -36,12 +33,8 @@ fn _abbe(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<machine::Machine>()?;
     module.add_class::<session::Session>()?;
-    module.add_class::<fit::Fit>()?;
-    module.add_class::<trace::Trace>()?;
-    module.add_class::<plan::Plan>()?;
+    module.add_class::<analysis::Analysis>()?;
     module.add_class::<model::Model>()?;
-    module.add_class::<model::Validation>()?;
-    module.add_class::<compare::Comparison>()?;
     module.add_class::<show::Table>()?;
     module.add_class::<show::Figure>()?;
     module.add_function(wrap_pyfunction!(equation::equation, module)?)?;

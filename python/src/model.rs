@@ -1,12 +1,11 @@
-//! An identified model: validated on other sessions, and used to correct commands.
+//! An identified model, and what follows from it: exports and corrected commands.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use abbe::apply::compare::workspace::rms_of_moved;
 use abbe::apply::correction::Correction;
 use abbe::apply::export::travel::Travel;
-use abbe::document::{Document, Origin, StatedValidation};
+use abbe::document::Origin;
 use abbe::exports::{self, Contents, ExportOptions};
 use abbe::files;
 use abbe::files::robot::dh::Convention;
@@ -15,18 +14,11 @@ use abbe::identify::model_file::{self, IdentifiedModel};
 use abbe::identify::unit::ARCSEC;
 use abbe::model::pose::Aim;
 use abbe::model::session::readings::Readings;
-use abbe::report::block::Report;
-use abbe::report::commands::Commands;
-use abbe::report::validate as present;
-use abbe::trace::validate::{self, validate};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use crate::failed::Failed;
-use crate::fit::call;
 use crate::machine::Machine;
-use crate::session::{Session, State};
-use crate::show::{self, Figure, Table};
 use crate::work;
 
 /// An identified model.
@@ -128,19 +120,6 @@ impl Model {
         })
     }
 
-    fn validate(&self, py: Python<'_>, session: &Session) -> PyResult<Validation> {
-        let state = session.state();
-        let (model, own) = (Arc::clone(&self.model), Arc::clone(&state));
-        let validation = work::run(py, None, move |_| {
-            let mut validation = validate(&model, &own.session)?;
-            validation.result.volumetric_rms_um = rms_of_moved(&model, &validation.result.moved)?;
-            Ok(validation)
-        })?;
-        let mut origin = state.origin.clone();
-        origin.add(self.origin.clone());
-        Ok(Validation { state, origin, validation })
-    }
-
     /// Corrected commands; `positions` has one column for each axis, mm or degrees.
     fn correct<'py>(
         &self,
@@ -228,61 +207,5 @@ impl Model {
         let tool_mm = tool_mm.unwrap_or(self.model.tool_mm);
         let errors = EstimatedErrors::of_model(&self.model, tool_mm, self.model.table_mm);
         with(&Correction { machine, errors: &errors, tool_mm, aim: Aim::of(machine) })
-    }
-}
-
-/// A validated model.
-#[pyclass(frozen, module = "abbe._abbe")]
-pub struct Validation {
-    state: Arc<State>,
-    origin: Origin,
-    validation: validate::Validation,
-}
-
-#[pymethods]
-impl Validation {
-    fn json(&self, seed: u64) -> Result<String, Failed> {
-        let stated = StatedValidation::of_validation(&self.validation.result);
-        Ok(Document::new(call("validate"), self.origin.clone(), Some(seed), &stated).text()?)
-    }
-
-    fn residuals_um<'py>(&self, py: Python<'py>, test: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let number = self.validation.tests.iter().position(|known| known == test);
-        let number = number.ok_or_else(|| crate::session::no_test(&self.state, test))?;
-        let um: Vec<f64> = self.validation.residuals[number].iter().map(|mm| mm * 1e3).collect();
-        Ok(um.into_pyarray(py))
-    }
-
-    fn tables(&self) -> Vec<Table> {
-        let result = &self.validation.result;
-        let mut tables = vec![present::residuals(result)];
-        if !result.moved.is_empty() {
-            tables.push(present::moved(result));
-        }
-        if !result.without.is_empty() {
-            tables.push(present::without(result));
-        }
-        tables.into_iter().map(Table).collect()
-    }
-
-    /// What `print` and a notebook show.
-    fn shown(&self) -> (String, String) {
-        show::shown(&self.report())
-    }
-
-    fn figures(&self) -> Vec<Figure> {
-        show::figures(&self.report())
-    }
-
-    fn page(&self, py: Python<'_>, seed: u64) -> PyResult<String> {
-        let read = (&self.state.session, &self.state.sources);
-        work::at_once(py, || show::page(&self.report(), read, "abbe.Model.validate", seed))
-    }
-}
-
-impl Validation {
-    fn report(&self) -> Report {
-        let stated = StatedValidation::of_validation(&self.validation.result);
-        present::report(&self.state.session, &self.validation, &stated, &Commands::default())
     }
 }

@@ -113,20 +113,17 @@ pub fn shown(report: &Report) -> (String, String) {
     (terminal::report(report, Some("`report` writes them")), notebook::html(report))
 }
 
-/// The page of a report; `call` is what was called in Python.
-///
-/// # Errors
-/// If a file of the session has changed since it was read.
-pub fn page(report: &Report, read: (&Session, &SourceMap), call: &str, seed: u64) -> Result<String, Failed> {
-    let provenance = Provenance { command: call.to_string(), ..Provenance::of(read, seed) };
-    Ok(page::html(report, &provenance)?)
-}
-
-/// The page of a report that is of no single session.
+/// The page of a report; `called` is what was called in Python.
 ///
 /// # Errors
 /// If a table of the report cannot be written.
-pub fn page_without_session(report: &Report, call: &str) -> Result<String, Failed> {
-    let provenance = Provenance { command: call.to_string(), ..Provenance::of_command(None) };
+pub fn page<'s>(
+    report: &Report,
+    sessions: impl Iterator<Item = (&'s Session, &'s SourceMap)>,
+    called: &str,
+    seed: u64,
+) -> Result<String, Failed> {
+    let mut provenance = Provenance { command: called.to_string(), ..Provenance::of_command(Some(seed)) };
+    sessions.for_each(|read| provenance.add(read));
     Ok(page::html(report, &provenance)?)
 }

@@ -29,7 +29,7 @@ def test_fit(command, name):
 def test_plan(command, name):
     session = abbe.Session.read(SESSIONS / name)
     plan = session.plan(effects=False)
-    assert plan._handle.json(1) == command("plan", SESSIONS / name, "--no-effects")
+    assert plan._handle.json() == command("plan", SESSIONS / name, "--no-effects")
     assert list(plan.ids) == [error["id"] for error in plan.to_dict()["errors"]]
     largest = np.max([np.abs(plan.sensitivity(test)).max(axis=0) for test in session.tests], axis=0)
     if session.instrument == "ballbar":
@@ -39,7 +39,7 @@ def test_plan(command, name):
 def test_plan_with_options(command):
     session = abbe.Session.read(SESSIONS / PLANS[1])
     plan = session.plan(noise_um=0.5)
-    assert plan._handle.json(1) == command("plan", SESSIONS / PLANS[1], "--noise-um", 0.5)
+    assert plan._handle.json() == command("plan", SESSIONS / PLANS[1], "--noise-um", 0.5)
 
 
 def test_trace_model_validation_and_report(command, measured, tmp_path):
@@ -63,7 +63,7 @@ def test_trace_model_validation_and_report(command, measured, tmp_path):
     folder = fresh.save(tmp_path / "fresh")
     fresh = abbe.Session.read(folder)
     validation = read.validate(fresh)
-    assert validation._handle.json(1) == command("validate", model, folder)
+    assert validation._handle.json() == command("validate", model, folder)
 
     trace.report(tmp_path / "trace.html")
     page = (tmp_path / "trace.html").read_text()

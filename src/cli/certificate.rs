@@ -24,7 +24,7 @@ pub struct CertificateArguments {
     ///
     /// Example: --dcc certificate.xml
     #[arg(long, value_name = "FILE.xml")]
-    dcc: Option<PathBuf>,
+    pub dcc: Option<PathBuf>,
     /// File of the administrative data of `--dcc`, if it is not `certificate.toml` beside the session.
     ///
     /// Example: --dcc certificate.xml --certificate laboratory.toml
@@ -41,11 +41,6 @@ pub struct Wanted<'a> {
 }
 
 impl CertificateArguments {
-    /// The file that is written, if one is asked for.
-    pub fn file(&self) -> Option<&PathBuf> {
-        self.dcc.as_ref()
-    }
-
     /// What the laboratory states, before the work; `None` if no certificate is asked for.
     ///
     /// # Errors

@@ -1,7 +1,5 @@
 //! `abbe compensate`: commands that cancel the errors of an identified model.
 
-mod positions;
-
 use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
@@ -16,7 +14,7 @@ use clap::Args;
 use super::failure::Failure;
 use super::interrupt::Interrupts;
 use super::results::{OutputArguments, Read};
-use super::{output, values};
+use super::{Global, output, values};
 use crate::report::compensate as present;
 
 /// Examples of `abbe compensate`.
@@ -53,14 +51,14 @@ pub struct CompensateArguments {
 }
 
 /// Runs `abbe compensate`.
-pub fn run(arguments: &CompensateArguments) -> Result<(), Failure> {
+pub fn run(arguments: &CompensateArguments, _: Global) -> Result<(), Failure> {
     let outputs = arguments.output.prepared(&[Some(&arguments.out)])?;
     outputs.refuse_overwrite([arguments.model.as_path(), arguments.commands.as_path()])?;
     let source = files::text(&arguments.model, "the model file")?;
     let model = model_file::of_source(&source)?;
     let machine = &model.machine;
     let tool_mm = values::point_mm("--tool-mm", &arguments.tool_mm, model.tool_mm)?;
-    let at = positions::stated(machine, &arguments.at)?;
+    let at = values::positions(machine, &arguments.at)?;
     let mut file = CommandFile::open(&arguments.commands, machine, at.clone())?;
     let columns = file.axis_columns();
     for text in &arguments.at {

@@ -12,6 +12,7 @@ use abbe::model::session::{Session, Test};
 use clap::Args;
 
 use self::form::FormArguments;
+use super::Global;
 use super::failure::Failure;
 use super::message::{Kind, tell};
 use super::output::Outputs;
@@ -77,7 +78,7 @@ fn read(arguments: &super::SessionArguments) -> Result<(Session, SourceMap), Fai
 }
 
 /// Runs `abbe equation`.
-pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
+pub fn run(arguments: &EquationArguments, _: Global) -> Result<(), Failure> {
     let form = &arguments.form;
     if arguments.all_tests && matches!(form.language.audience, Audience::Compilers | Audience::Algebra) {
         return files::write(arguments);

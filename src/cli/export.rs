@@ -14,7 +14,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 
 use super::failure::Failure;
 use super::results::{OutputArguments, Read};
-use super::{folder, output, values};
+use super::{Global, folder, output, values};
 use crate::report::export as present;
 
 /// Examples of `abbe export`.
@@ -89,7 +89,7 @@ pub struct ExportArguments {
 }
 
 /// Runs `abbe export`.
-pub fn run(arguments: &ExportArguments) -> Result<(), Failure> {
+pub fn run(arguments: &ExportArguments, _: Global) -> Result<(), Failure> {
     let format = exports::format(&arguments.format)?;
     let file = Some(&arguments.out).filter(|_| !format.is_of_tables());
     let outputs = arguments.output.prepared(&[file])?;

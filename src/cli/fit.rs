@@ -1,6 +1,6 @@
 //! `abbe fit`: estimate errors from readings.
 
-use abbe::document::StatedFit;
+use abbe::analysis::FitOptions;
 use abbe::identify::{fit, propagation};
 use abbe::trace::SessionFit;
 use clap::Args;
@@ -8,10 +8,10 @@ use clap::Args;
 use super::failure::Failure;
 use super::forms::FormArguments;
 use super::method::{self, Method};
+use super::readings::ReadingArguments;
 use super::results::Read;
 use super::save::SaveArguments;
-use super::{CommonArguments, SessionArguments, certificate, monte_carlo, read_session, readings};
-use crate::report;
+use super::{CommonArguments, Global, SessionArguments, certificate, monte_carlo, read_session};
 
 /// Examples of `abbe fit`.
 pub const HELP: &str = include_str!("help/fit.txt");
@@ -29,19 +29,15 @@ pub struct FitArguments {
     save: SaveArguments,
     #[command(flatten)]
     forms: FormArguments,
-    /// Explanation that is accepted on the user's word: a declared effect, or one of its aliases, which then takes its
-    /// place. Uncertainties do not cover the others; every output says so. May be repeated.
-    ///
-    /// Example: --assume EZC~C:h2
-    #[arg(long, value_name = "EFFECT", allow_hyphen_values = true)]
-    assume: Vec<String>,
+    #[command(flatten)]
+    options: FitOptions,
     /// Method of identification.
     ///
     /// Example: --method two-plane
     #[arg(long, value_enum, default_value = "full")]
     method: Method,
     #[command(flatten)]
-    readings: readings::ReadingArguments,
+    readings: ReadingArguments,
     #[command(flatten)]
     certificate: certificate::CertificateArguments,
     #[command(flatten)]
@@ -49,14 +45,14 @@ pub struct FitArguments {
 }
 
 /// Runs `abbe fit`.
-pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
+pub fn run(arguments: &FitArguments, _: Global) -> Result<(), Failure> {
     let common = &arguments.common;
-    let [views, residuals] = arguments.readings.files();
-    let others = [views, residuals, arguments.save.file(), arguments.certificate.file()];
-    let outputs = common.output.prepared(&others)?;
+    let ReadingArguments { views, residuals } = &arguments.readings;
+    let (save, dcc) = (&arguments.save.save, &arguments.certificate.dcc);
+    let outputs = common.output.prepared(&[views, residuals, save, dcc].map(Option::as_ref))?;
     let wanted = arguments.certificate.read(&arguments.session.session, &outputs)?;
     let (session, sources) = read_session(&arguments.session, &outputs)?;
-    let session = fit::assume(&session, &arguments.assume)?;
+    let session = fit::assume(&session, &arguments.options.assume)?;
     let certificate = wanted.as_ref().map(|wanted| wanted.of(&session)).transpose()?;
     let mut read = Read::session(&session, &sources, common.seed);
     read.files.extend(wanted.as_ref().and_then(|wanted| wanted.stamp.as_ref()));
@@ -66,28 +62,27 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
             ("--residuals", residuals.is_some()),
             ("--base", arguments.forms.base),
             ("--terms", arguments.forms.terms.is_some()),
-            ("--save", arguments.save.file().is_some()),
-            ("--dcc", arguments.certificate.file().is_some()),
+            ("--save", save.is_some()),
+            ("--dcc", dcc.is_some()),
             ("--allow-implausible", arguments.plausibility.allow_implausible),
         ])?;
         return arguments.method.run(&session, &arguments.draws, (common, &outputs), &read);
     }
     let draws = arguments.draws.draws(common.seed)?;
-    let SessionFit { problem, fit: found, mut result } = SessionFit::of(&session, common.seed)?;
-    arguments.readings.write(&problem, &found)?;
+    let mut found = SessionFit::of(&session, common.seed)?;
+    let SessionFit { problem, fit, result } = &mut found;
+    arguments.readings.write(problem, fit)?;
     arguments.plausibility.check(&result.plausibility)?;
     if let Some(draws) = &draws {
-        propagation::add_monte_carlo(&problem, &found, draws, &mut result)?;
+        propagation::add_monte_carlo(problem, fit, draws, result)?;
     }
-    arguments.forms.add(&problem, &found, &mut result)?;
-    let repeated: Vec<_> =
-        common.repeated(&arguments.assume).into_iter().chain(arguments.plausibility.repeated()).collect();
-    let commands = arguments.session.commands("fit", &repeated);
-    let stated = StatedFit::of_fit(&problem, &result);
-    let report = report::fit::report(&problem, &found, &stated, &commands, common.output.figures())?;
-    common.output.put(&outputs, &report, &stated, &read)?;
+    arguments.forms.add(problem, fit, result)?;
+    let options =
+        FitOptions { allow_implausible: arguments.plausibility.allow_implausible, ..arguments.options.clone() };
+    let commands = arguments.session.commands::<SessionFit>(common.seed, &options)?;
+    common.output.put_found(&outputs, &found, &commands, &read)?;
     if let (Some(wanted), Some(certificate)) = (&wanted, &certificate) {
-        wanted.write(certificate, &problem, &result)?;
+        wanted.write(certificate, &found.problem, &found.result)?;
     }
-    arguments.save.run(&problem, &found, &sources, common.seed)
+    arguments.save.run(&found.problem, &found.fit, &sources, common.seed)
 }

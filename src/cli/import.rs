@@ -13,7 +13,7 @@ use clap::builder::PossibleValuesParser;
 use super::failure::Failure;
 use super::message::{Kind, tell};
 use super::results::{OutputArguments, Read};
-use super::{folder, output};
+use super::{Global, folder, output};
 use crate::report::import as present;
 
 /// Examples of `abbe import`.
@@ -76,7 +76,7 @@ pub struct ImportArguments {
 }
 
 /// Runs `abbe import`.
-pub fn run(arguments: &ImportArguments) -> Result<(), Failure> {
+pub fn run(arguments: &ImportArguments, _: Global) -> Result<(), Failure> {
     let outputs = arguments.output.prepared(&[])?;
     let of_words = |(message, help): (String, String)| Failure::CommandLine(format!("{message}; {help}"));
     let options = ImportOptions {

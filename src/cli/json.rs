@@ -1,25 +1,12 @@
-//! JSON documents of this process: its command line as the call.
+//! The command line of this process as the call of its JSON documents.
 
 use std::any::TypeId;
-use std::path::Path;
 
 use abbe::document::Call;
-pub use abbe::document::{Document, Origin};
 use clap::{Arg, ArgAction, ArgMatches, CommandFactory};
-use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::failure::Failure;
-use super::{Arguments, output};
-
-/// Writes the document of this command.
-///
-/// # Errors
-/// If the result is no JSON, or the file cannot be written.
-pub fn write<T: Serialize>(path: &Path, origin: Origin, seed: Option<u64>, result: &T) -> Result<(), Failure> {
-    let text = Document::new(command_line(), origin, seed, result).text()?;
-    output::write_whole(path, text.as_bytes())
-}
+use super::Arguments;
 
 /// The name of the command, and the options on the command line of this process.
 pub fn command_line() -> Call {

@@ -25,10 +25,10 @@ pub struct MapArguments {
         requires = "functions",
         conflicts_with_all = ["language", "order", "rotation", "errors", "notation", "gradient", "out"]
     )]
-    map: Option<PathBuf>,
+    pub map: Option<PathBuf>,
     /// The errors as functions of the axes: a TOML file of constants, tables, polynomials and harmonics.
     #[arg(long, value_name = "FILE", requires = "map")]
-    functions: Option<PathBuf>,
+    pub functions: Option<PathBuf>,
     /// Number of places along each axis: here of each that moves.
     #[arg(long, value_name = "N", requires = "map", default_value_t = 5)]
     places: usize,
@@ -43,23 +43,6 @@ pub struct MapArguments {
     correction: bool,
     #[command(flatten)]
     pub output: OutputArguments,
-}
-
-impl MapArguments {
-    /// The file of the map.
-    pub fn file(&self) -> Option<&PathBuf> {
-        self.map.as_ref()
-    }
-
-    /// The file of the errors.
-    pub fn functions(&self) -> Option<&PathBuf> {
-        self.functions.as_ref()
-    }
-
-    /// Whether a map is asked for.
-    pub fn wanted(&self) -> bool {
-        self.map.is_some()
-    }
 }
 
 /// Runs `abbe volumetric --map`.

@@ -8,7 +8,7 @@ macro_rules! say {
 mod certificate;
 mod compare;
 mod compensate;
-mod controls;
+mod completions;
 mod equation;
 mod excerpt;
 mod export;
@@ -37,7 +37,6 @@ mod repeated;
 mod results;
 mod save;
 mod schema;
-mod search;
 mod sheet;
 mod simulate;
 mod trace;
@@ -48,11 +47,13 @@ mod volumetric;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use abbe::analysis::{self, Analysis};
 use abbe::files::{self, ReadOptions, SourceMap};
 use abbe::identify::plausibility::{self, Plausibility};
 use abbe::model::session::Session;
 use abbe::model::session::motion::Motion;
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
+use serde_json::Map;
 
 use crate::report::commands::Commands;
 use failure::Failure;
@@ -73,74 +74,48 @@ struct Arguments {
     threads: Option<u32>,
 }
 
-const COMPLETIONS: &str = "Example:
-  abbe completions bash
+/// The options of all commands.
+#[derive(Clone, Copy)]
+pub struct Global {
+    quiet: bool,
+    threads: Option<u32>,
+}
 
-Save the output where the shell finds it: ~/.local/share/bash-completion/completions/abbe (bash), a folder of $fpath as _abbe (zsh),
-~/.config/fish/completions/abbe.fish (fish).";
+/// The commands: a line for each, with what it does. Its file has its arguments, its examples and what runs it.
+macro_rules! commands {
+    ($($name:ident: $module:ident::$arguments:ident = $about:literal;)*) => {
+        #[derive(Subcommand)]
+        enum Command {
+            $(#[doc = $about] #[command(after_help = $module::HELP)] $name(Box<$module::$arguments>),)*
+        }
 
-#[derive(Subcommand)]
-enum Command {
-    /// Print the closed-form equation of a test.
-    #[command(after_help = equation::HELP)]
-    Equation(equation::EquationArguments),
-    /// Print or map the volumetric error, and compensate it.
-    #[command(after_help = volumetric::HELP)]
-    Volumetric(volumetric::VolumetricArguments),
-    /// State what differs between sessions or models of one machine.
-    #[command(after_help = compare::HELP)]
-    Compare(compare::CompareArguments),
-    /// Correct commanded positions or poses with a model.
-    #[command(after_help = compensate::HELP)]
-    Compensate(compensate::CompensateArguments),
-    /// Export the calibrated machine for controls and other programs.
-    #[command(after_help = export::HELP)]
-    Export(export::ExportArguments),
-    /// Write the NC programs of planned tests.
-    #[command(after_help = nc::HELP)]
-    Nc(nc::NcArguments),
-    /// Estimate errors from readings, with uncertainties.
-    #[command(after_help = fit::HELP)]
-    Fit(fit::FitArguments),
-    /// Write text, tables and figures for LaTeX and Typst.
-    #[command(after_help = paper::HELP)]
-    Paper(paper::PaperArguments),
-    /// State what planned tests identify, how surely, and what improves.
-    #[command(after_help = plan::HELP)]
-    Plan(Box<plan::PlanArguments>),
-    /// Create a machine and a session.
-    #[command(after_help = new::HELP)]
-    New(new::NewArguments),
-    /// Write the completions of a shell.
-    #[command(after_help = COMPLETIONS)]
-    Completions {
-        /// The shell.
-        shell: clap_complete::Shell,
-    },
-    /// Analyse many sessions and show machines over time; simulate studies.
-    #[command(subcommand, after_help = fleet::HELP)]
-    Fleet(Box<fleet::Fleet>),
-    /// Turn foreign files of readings into a session.
-    #[command(after_help = import::HELP)]
-    Import(import::ImportArguments),
-    /// Print the JSON Schema of a file or a result.
-    #[command(after_help = schema::HELP)]
-    Schema(schema::SchemaArguments),
-    /// Write set-up sheets of planned tests.
-    #[command(after_help = sheet::HELP)]
-    Sheet(sheet::SheetArguments),
-    /// Simulate readings of planned tests with given errors.
-    #[command(after_help = simulate::HELP)]
-    Simulate(Box<simulate::SimulateArguments>),
-    /// Choose the poses of a robot or a probe that determine its errors best.
-    #[command(after_help = poses::HELP)]
-    Poses(poses::PoseArguments),
-    /// Find the unmodelled effect behind the residual.
-    #[command(after_help = trace::HELP)]
-    Trace(trace::TraceArguments),
-    /// Test a saved model on readings that it never saw.
-    #[command(after_help = validate::HELP)]
-    Validate(validate::ValidateArguments),
+        /// Runs a command.
+        fn execute(command: Command, global: Global) -> Result<(), Failure> {
+            match command { $(Command::$name(arguments) => $module::run(&arguments, global),)* }
+        }
+    };
+}
+
+commands! {
+    Equation: equation::EquationArguments = "Print the closed-form equation of a test.";
+    Volumetric: volumetric::VolumetricArguments = "Print or map the volumetric error, and compensate it.";
+    Compare: compare::CompareArguments = "State what differs between sessions or models of one machine.";
+    Compensate: compensate::CompensateArguments = "Correct commanded positions or poses with a model.";
+    Export: export::ExportArguments = "Export the calibrated machine for controls and other programs.";
+    Nc: nc::NcArguments = "Write the NC programs of planned tests.";
+    Fit: fit::FitArguments = "Estimate errors from readings, with uncertainties.";
+    Paper: paper::PaperArguments = "Write text, tables and figures for LaTeX and Typst.";
+    Plan: plan::PlanArguments = "State what planned tests identify, how surely, and what improves.";
+    New: new::NewArguments = "Create a machine and a session.";
+    Completions: completions::CompletionArguments = "Write the completions of a shell.";
+    Fleet: fleet::FleetArguments = "Analyse many sessions and show machines over time; simulate studies.";
+    Import: import::ImportArguments = "Turn foreign files of readings into a session.";
+    Schema: schema::SchemaArguments = "Print the JSON Schema of a file or a result.";
+    Sheet: sheet::SheetArguments = "Write set-up sheets of planned tests.";
+    Simulate: simulate::SimulateArguments = "Simulate readings of planned tests with given errors.";
+    Poses: poses::PoseArguments = "Choose the poses of a robot or a probe that determine its errors best.";
+    Trace: trace::TraceArguments = "Find the unmodelled effect behind the residual.";
+    Validate: validate::ValidateArguments = "Test a saved model on readings that it never saw.";
 }
 
 /// Arguments of every command that reads a session.
@@ -187,21 +162,6 @@ pub struct PlausibilityArguments {
 }
 
 impl PlausibilityArguments {
-    /// Refuses the option without another one to which it belongs.
-    fn belongs_to(self, other: &str, is_given: bool) -> Result<(), Failure> {
-        if self.allow_implausible && !is_given {
-            return Err(Failure::CommandLine(format!(
-                "`--allow-implausible` belongs to `{other}`; state both or none"
-            )));
-        }
-        Ok(())
-    }
-
-    /// The option, for a command line that repeats the result.
-    fn repeated(self) -> Option<(&'static str, String)> {
-        self.allow_implausible.then(|| ("--allow-implausible", String::new()))
-    }
-
     /// Refuses estimates that mean nothing and have a cause.
     fn check(self, found: &Plausibility) -> Result<(), Failure> {
         if self.allow_implausible { Ok(()) } else { Ok(plausibility::accepted(found)?) }
@@ -224,9 +184,16 @@ impl SessionArguments {
         Ok((session, sources))
     }
 
-    /// How command lines name the session after a command with these options, on which its result depends.
-    fn commands(&self, verb: &'static str, options: &[(&str, String)]) -> Commands {
-        self.data.commands(&self.session).made_by(verb, options)
+    /// How command lines name the session after an analysis with these options, on which its result depends.
+    fn commands<A: Analysis>(&self, seed: u64, options: &A::Options) -> Result<Commands, Failure> {
+        let mut repeated = Map::new();
+        if seed != 1 {
+            repeated.insert("seed".to_string(), seed.into());
+        }
+        repeated.extend(analysis::stated(options).map_err(|cause| Failure::Other(cause.to_string()))?);
+        // The next search may take its time.
+        repeated.shift_remove("time_limit");
+        Ok(self.data.commands(&self.session).made_by(A::NAME, &repeated))
     }
 }
 
@@ -250,14 +217,6 @@ pub struct CommonArguments {
     seed: u64,
 }
 
-impl CommonArguments {
-    /// The seed and the accepted explanations, for a command line that repeats the result.
-    fn repeated(&self, assumed: &[String]) -> Vec<(&'static str, String)> {
-        let seed = (self.seed != 1).then(|| ("--seed", self.seed.to_string()));
-        seed.into_iter().chain(assumed.iter().map(|effect| ("--assume", effect.clone()))).collect()
-    }
-}
-
 /// Runs the command line and returns the exit status.
 pub fn run() -> ExitCode {
     interrupt::watch();
@@ -273,7 +232,7 @@ pub fn run() -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    match with_threads(threads).and_then(|()| execute(command, quiet, threads)) {
+    match with_threads(threads).and_then(|()| execute(command, Global { quiet, threads })) {
         Ok(()) => ExitCode::SUCCESS,
         Err(_) if interrupt::is_ended() => ExitCode::from(interrupt::status()),
         Err(failure) => {
@@ -294,37 +253,7 @@ fn with_threads(threads: Option<u32>) -> Result<(), Failure> {
 fn again(arguments: &[&str], quiet: bool) -> Result<(), Failure> {
     let words = std::iter::once("abbe").chain(arguments.iter().copied());
     let parsed = Arguments::try_parse_from(words).map_err(|wrong| Failure::CommandLine(wrong.to_string()))?;
-    execute(parsed.command, quiet, parsed.threads)
-}
-
-/// Runs a command.
-fn execute(command: Command, quiet: bool, threads: Option<u32>) -> Result<(), Failure> {
-    match command {
-        Command::Equation(arguments) => equation::run(&arguments),
-        Command::Volumetric(arguments) => volumetric::run(&arguments),
-        Command::Compare(arguments) => compare::run(&arguments),
-        Command::Compensate(arguments) => compensate::run(&arguments),
-        Command::Export(arguments) => export::run(&arguments),
-        Command::Nc(arguments) => nc::run(&arguments, quiet),
-        Command::Fit(arguments) => fit::run(&arguments),
-        Command::Paper(arguments) => paper::run(&arguments, quiet),
-        Command::Plan(arguments) => plan::run(&arguments),
-        Command::New(arguments) => new::run(&arguments, quiet),
-        Command::Completions { shell } => {
-            let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Arguments::command(), "abbe", &mut script);
-            output::whole(String::from_utf8_lossy(&script).trim_end());
-            Ok(())
-        }
-        Command::Fleet(command) => fleet::run(&command, threads),
-        Command::Import(arguments) => import::run(&arguments),
-        Command::Poses(arguments) => poses::run(&arguments),
-        Command::Schema(arguments) => schema::run(&arguments),
-        Command::Sheet(arguments) => sheet::run(&arguments, quiet),
-        Command::Simulate(arguments) => simulate::run(&arguments),
-        Command::Trace(arguments) => trace::run(&arguments),
-        Command::Validate(arguments) => validate::run(&arguments),
-    }
+    execute(parsed.command, Global { quiet, threads: parsed.threads })
 }
 
 /// Reads the session, with its sources. No output may replace one of its files.

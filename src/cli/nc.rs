@@ -11,7 +11,7 @@ use clap::Args;
 use self::motion::MotionArguments;
 use super::failure::Failure;
 use super::message::print_warnings;
-use super::{SessionArguments, controls, folder, output};
+use super::{Global, SessionArguments, folder, output};
 use crate::printers::terminal;
 use crate::report::nc as present;
 
@@ -26,7 +26,7 @@ pub struct NcArguments {
     /// The control of the NC programs.
     ///
     /// Example: --control linuxcnc
-    #[arg(long, value_name = "CONTROL", value_parser = controls::with_programs())]
+    #[arg(long, value_name = "CONTROL", value_parser = motion::controls())]
     control: &'static dyn nc::Control,
     /// Where the result is written: a new folder for the programs.
     ///
@@ -40,7 +40,7 @@ pub struct NcArguments {
 }
 
 /// Runs `abbe nc`.
-pub fn run(arguments: &NcArguments, quiet: bool) -> Result<(), Failure> {
+pub fn run(arguments: &NcArguments, Global { quiet, .. }: Global) -> Result<(), Failure> {
     let control = arguments.control;
     let options = arguments.motion.options();
     let (session, sources) = arguments.session.read_planned(|session| nc::has_letters(&session.machine))?;

@@ -13,6 +13,7 @@ use clap::Args;
 
 use self::sizes::SizeArguments;
 use self::templates::TEMPLATES;
+use super::Global;
 use super::failure::Failure;
 use super::folder::{self, NewFile};
 
@@ -56,7 +57,7 @@ pub struct NewArguments {
 }
 
 /// Runs `abbe new`.
-pub fn run(arguments: &NewArguments, quiet: bool) -> Result<(), Failure> {
+pub fn run(arguments: &NewArguments, Global { quiet, .. }: Global) -> Result<(), Failure> {
     let (Some(folder), false) = (&arguments.out, arguments.list) else {
         list();
         return Ok(());

@@ -12,7 +12,7 @@ use clap::Args;
 use super::failure::Failure;
 use super::message::print_warnings;
 use super::values::{self, Words};
-use super::{DataArguments, folder, output};
+use super::{DataArguments, Global, folder, output};
 use crate::printers::paper;
 use crate::printers::paper::layout::{Class, Layout};
 use crate::report::paper::{SUBJECTS, Subject};
@@ -64,7 +64,7 @@ pub struct PaperArguments {
 }
 
 /// Runs `abbe paper`.
-pub fn run(arguments: &PaperArguments, quiet: bool) -> Result<(), Failure> {
+pub fn run(arguments: &PaperArguments, Global { quiet, .. }: Global) -> Result<(), Failure> {
     folder::check(&arguments.out, arguments.folder.force)?;
     let mut studies = Vec::new();
     let mut origins = Vec::new();

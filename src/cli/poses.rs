@@ -12,7 +12,7 @@ use clap::Args;
 use super::failure::Failure;
 use super::results::Read;
 use super::values::{self, Words};
-use super::{CommonArguments, SessionArguments};
+use super::{CommonArguments, Global, SessionArguments};
 use crate::report::poses as present;
 
 /// Examples of `abbe poses`.
@@ -83,7 +83,7 @@ pub struct PoseArguments {
 }
 
 /// Runs `abbe poses`, without the data of the session unless only they tell where a socket is.
-pub fn run(arguments: &PoseArguments) -> Result<(), Failure> {
+pub fn run(arguments: &PoseArguments, _: Global) -> Result<(), Failure> {
     let common = &arguments.common;
     let outputs = common.output.prepared(&[arguments.out.as_ref()])?;
     let reading = ReadOptions { read_data: false, ..arguments.session.options() };

@@ -18,21 +18,16 @@ pub struct ReadingArguments {
     ///
     /// Example: --views views.csv
     #[arg(long, value_name = "FILE.csv")]
-    views: Option<PathBuf>,
+    pub views: Option<PathBuf>,
     /// Write reading and residual of every reading as CSV: test, run, line, axis positions, reading, residual in µm,
     /// residual over the noise standard deviation, and whether the reading counts or is an outlier; of the full fit.
     ///
     /// Example: --residuals residuals.csv
     #[arg(long, value_name = "FILE.csv")]
-    residuals: Option<PathBuf>,
+    pub residuals: Option<PathBuf>,
 }
 
 impl ReadingArguments {
-    /// The files of both tables, if they are asked for.
-    pub fn files(&self) -> [Option<&PathBuf>; 2] {
-        [self.views.as_ref(), self.residuals.as_ref()]
-    }
-
     /// Writes the tables that are asked for.
     pub fn write(&self, problem: &Problem, fit: &Fit) -> Result<(), Failure> {
         if let Some(path) = &self.views {

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use abbe::analysis::Found;
+use abbe::document::{Call, Document, Origin};
 use abbe::files::SourceMap;
 use abbe::files::stamp::FileStamp;
 use abbe::model::session::Session;
@@ -10,11 +12,12 @@ use serde::Serialize;
 
 use super::failure::Failure;
 use super::folder;
-use super::json::{self, Origin};
+use super::json;
 use super::message::print_warnings;
 use super::output::{self, Outputs};
 use crate::printers::{csv, page, terminal};
 use crate::report::block::Report;
+use crate::report::commands::Commands;
 use crate::report::figure::svg;
 use crate::report::provenance::{Input, Provenance};
 
@@ -119,11 +122,6 @@ impl OutputArguments {
         Ok(Outputs::new(others.iter().chain(&own).copied().flatten())?.quieted(self.quiet))
     }
 
-    /// Whether figures are asked for.
-    pub fn figures(&self) -> bool {
-        self.report.is_some() || self.plots.is_some()
-    }
-
     /// Prints a report, and writes it and its result to the files that are asked for.
     ///
     /// # Errors
@@ -135,9 +133,31 @@ impl OutputArguments {
         result: &T,
         read: &Read<'_>,
     ) -> Result<(), Failure> {
+        self.write(outputs, report, read, |call, origin| Document::new(call, origin, read.seed, result).text())
+    }
+
+    /// The same of an analysis. Its report proposes `commands`.
+    pub fn put_found(
+        &self,
+        outputs: &Outputs,
+        found: &dyn Found,
+        commands: &Commands,
+        read: &Read<'_>,
+    ) -> Result<(), Failure> {
+        let report = found.report(commands, self.report.is_some() || self.plots.is_some())?;
+        self.write(outputs, &report, read, |call, origin| found.document(call, origin, read.seed))
+    }
+
+    fn write(
+        &self,
+        outputs: &Outputs,
+        report: &Report,
+        read: &Read<'_>,
+        document: impl FnOnce(Call, Origin) -> Result<String, String>,
+    ) -> Result<(), Failure> {
         self.show(outputs, report);
         if let Some(path) = &self.json {
-            json::write(path, read.origin(), read.seed, result)?;
+            output::write_whole(path, document(json::command_line(), read.origin())?.as_bytes())?;
         }
         if let Some(path) = &self.csv {
             output::write_whole(path, &csv::report(report)?)?;

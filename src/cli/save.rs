@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use abbe::document::Origin;
 use abbe::files::SourceMap;
 use abbe::identify::fit::Fit;
 use abbe::identify::model_file::IdentifiedModel;
@@ -19,25 +20,17 @@ pub struct SaveArguments {
     ///
     /// Example: --save model.json
     #[arg(long, value_name = "MODEL")]
-    save: Option<PathBuf>,
+    pub save: Option<PathBuf>,
 }
 
 impl SaveArguments {
-    /// The file.
-    pub fn file(&self) -> Option<&PathBuf> {
-        self.save.as_ref()
-    }
-
     /// Saves the model of a fit, if it is requested.
     pub fn run(&self, problem: &Problem, fit: &Fit, sources: &SourceMap, seed: u64) -> Result<(), Failure> {
         let Some(path) = &self.save else {
             return Ok(());
         };
-        let model = IdentifiedModel::of_fit(
-            problem,
-            fit,
-            json::Origin::of_session(sources).provenance(json::command_line(), seed),
-        )?;
+        let model =
+            IdentifiedModel::of_fit(problem, fit, Origin::of_session(sources).provenance(json::command_line(), seed))?;
         output::write_whole(path, model.to_text()?.as_bytes())
     }
 }

@@ -5,7 +5,7 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
 use super::failure::Failure;
-use super::output;
+use super::{Global, output};
 
 /// Examples of `abbe schema`.
 pub const HELP: &str = "Examples:
@@ -28,7 +28,7 @@ pub struct SchemaArguments {
 }
 
 /// Runs `abbe schema`.
-pub fn run(arguments: &SchemaArguments) -> Result<(), Failure> {
+pub fn run(arguments: &SchemaArguments, _: Global) -> Result<(), Failure> {
     let file = SCHEMAS.iter().find(|file| file.word == arguments.subject);
     let schema = file.map(|file| (file.schema)());
     let text = serde_json::to_string_pretty(&schema);

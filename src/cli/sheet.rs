@@ -11,8 +11,8 @@ use clap::Args;
 
 use super::failure::Failure;
 use super::message::print_warnings;
-use super::nc::motion::MotionArguments;
-use super::{SessionArguments, controls, output, values};
+use super::nc::motion::{self, MotionArguments};
+use super::{Global, SessionArguments, output, values};
 use crate::printers::sheet as present;
 
 /// Examples of `abbe sheet`.
@@ -51,14 +51,14 @@ pub struct SheetArguments {
     /// The control of the NC programs: the sheets name them.
     ///
     /// Example: --control fanuc
-    #[arg(long, value_name = "CONTROL", value_parser = controls::with_programs())]
+    #[arg(long, value_name = "CONTROL", value_parser = motion::controls())]
     control: Option<&'static dyn Control>,
     #[command(flatten)]
     motion: MotionArguments,
 }
 
 /// Runs `abbe sheet`.
-pub fn run(arguments: &SheetArguments, quiet: bool) -> Result<(), Failure> {
+pub fn run(arguments: &SheetArguments, Global { quiet, .. }: Global) -> Result<(), Failure> {
     for (flag, value) in
         [("--setup-min", arguments.setup_min), ("--test-min", arguments.test_min), ("--bar-min", arguments.bar_min)]
     {

@@ -10,7 +10,7 @@ use clap::Args;
 
 use super::failure::Failure;
 use super::results::Read;
-use super::{CommonArguments, SessionArguments, folder, output, read_session, values};
+use super::{CommonArguments, Global, SessionArguments, folder, output, read_session, values};
 use crate::report::simulation as present;
 
 /// Examples of `abbe simulate`, and the names of values.
@@ -62,7 +62,7 @@ pub struct SimulateArguments {
 }
 
 /// Runs `abbe simulate`.
-pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
+pub fn run(arguments: &SimulateArguments, _: Global) -> Result<(), Failure> {
     let outputs = arguments.common.output.prepared(&[])?;
     let (session, sources) = read_session(&arguments.session, &outputs)?;
     let mut given = match &arguments.file {

@@ -6,8 +6,8 @@ mod progress;
 
 use std::path::PathBuf;
 
-use abbe::document::StatedTrace;
-use abbe::trace::TraceOptions;
+use abbe::analysis::SearchOptions;
+use abbe::trace::TraceOutcome;
 use clap::Args;
 
 use clock::seconds;
@@ -15,9 +15,8 @@ use clock::seconds;
 use super::failure::Failure;
 use super::results::Read;
 use super::save::SaveArguments;
-use super::search::SearchArguments;
-use super::{CommonArguments, PlausibilityArguments, SessionArguments, next_session, output, read_session};
-use crate::report::{readings, trace as present};
+use super::{CommonArguments, Global, PlausibilityArguments, SessionArguments, next_session, output, read_session};
+use crate::report::readings;
 
 /// Examples of `abbe trace`.
 pub const HELP: &str = include_str!("help/trace.txt");
@@ -34,13 +33,7 @@ pub struct TraceArguments {
     #[command(flatten)]
     save: SaveArguments,
     #[command(flatten)]
-    search: SearchArguments,
-    /// Explanation that is accepted on the user's word: a found effect, or one of its aliases, which then takes its place.
-    /// Uncertainties do not cover the others; every output says so. May be repeated.
-    ///
-    /// Example: --assume EAC~C:h1
-    #[arg(long, value_name = "EFFECT", allow_hyphen_values = true)]
-    assume: Vec<String>,
+    options: SearchOptions,
     /// End the search after this many seconds. The effects found until then are fitted and reported, and every output
     /// states that the result is incomplete.
     ///
@@ -70,32 +63,24 @@ pub struct TraceArguments {
 }
 
 /// Runs `abbe trace`.
-pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
+pub fn run(arguments: &TraceArguments, _: Global) -> Result<(), Failure> {
     let common = &arguments.common;
     let force = common.output.folder.force;
     arguments.next.check(force)?;
-    let others = [arguments.write.as_ref(), arguments.residuals.as_ref(), arguments.save.file()];
+    let others = [arguments.write.as_ref(), arguments.residuals.as_ref(), arguments.save.save.as_ref()];
     let outputs = common.output.prepared(&others)?;
     let (session, sources) = read_session(&arguments.session, &outputs)?;
-    let options = TraceOptions {
-        seed: common.seed,
-        max_effects: arguments.search.max_effects,
-        only: arguments.search.only.clone(),
-        exclude: arguments.search.exclude.clone(),
-        assume: arguments.assume.clone(),
-        ..TraceOptions::default()
+    let options = SearchOptions {
+        allow_implausible: arguments.plausibility.allow_implausible,
+        time_limit: arguments.time_limit,
+        ..arguments.options.clone()
     };
     if arguments.list {
-        return progress::list(&session, &options);
+        return progress::list(&session, &options.with_seed(common.seed));
     }
-    let ends = (arguments.time_limit, common.output.quiet);
-    let trace = progress::trace(&session, &options, arguments.plausibility, ends)?;
-    let stated = StatedTrace::of_trace(&trace);
-    let accepted: Vec<_> = arguments.plausibility.repeated().into_iter().collect();
-    let repeated = [common.repeated(&arguments.assume), arguments.search.repeated(), accepted].concat();
-    let commands = arguments.session.commands("trace", &repeated);
-    let report = present::report(&trace, &stated, &commands, common.output.figures())?;
-    common.output.put(&outputs, &report, &stated, &Read::session(&session, &sources, common.seed))?;
+    let trace = progress::trace(&session, &options, common.seed, common.output.quiet)?;
+    let commands = arguments.session.commands::<TraceOutcome>(common.seed, &options)?;
+    common.output.put_found(&outputs, &trace, &commands, &Read::session(&session, &sources, common.seed))?;
     if let Some(path) = &arguments.write {
         next_session::write(path, &sources, &arguments.session, |text| {
             next_session::add_trace(text, &trace, &session.machine, arguments.with_tests)
@@ -105,7 +90,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         output::write_whole(path, &output::csv(&readings::residuals(&trace.after, &trace.after_fit))?)?;
     }
     if trace.result.interrupted {
-        return progress::ended_early(&trace, arguments.save.file().is_some());
+        return progress::ended_early(&trace, arguments.save.save.is_some());
     }
     arguments.next.run(&session, &sources, &trace, (common.output.quiet, force))?;
     arguments.save.run(&trace.after, &trace.after_fit, &sources, common.seed)

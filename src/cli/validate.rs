@@ -2,18 +2,14 @@
 
 use std::path::PathBuf;
 
-use abbe::apply::compare::workspace::rms_of_moved;
-use abbe::document::StatedValidation;
+use abbe::analysis::{Analysis, Given, Validated, ValidationOptions};
 use abbe::files;
 use abbe::identify::model_file;
-use abbe::model::component::ErrorName;
-use abbe::trace::validate::validate_anew;
 use clap::Args;
 
 use super::failure::Failure;
 use super::results::Read;
-use super::{CommonArguments, SessionArguments, read_session, values};
-use crate::report;
+use super::{CommonArguments, Global, SessionArguments, read_session};
 
 /// Examples of `abbe validate`.
 pub const HELP: &str = include_str!("help/validate.txt");
@@ -25,27 +21,24 @@ pub struct ValidateArguments {
     model: PathBuf,
     #[command(flatten)]
     session: SessionArguments,
-    /// Errors of the machine that a new mounting changes, such as EC0AZ: estimated from SESSION like its set-up, not taken
-    /// from the model. Separate several by commas.
-    #[arg(long, value_name = "ERROR", value_delimiter = ',', value_parser = values::error_name)]
-    anew: Vec<ErrorName>,
+    #[command(flatten)]
+    options: ValidationOptions,
     #[command(flatten)]
     common: CommonArguments,
 }
 
 /// Runs `abbe validate`.
-pub fn run(arguments: &ValidateArguments) -> Result<(), Failure> {
+pub fn run(arguments: &ValidateArguments, _: Global) -> Result<(), Failure> {
     let common = &arguments.common;
     let outputs = common.output.prepared(&[])?;
     outputs.refuse_overwrite([arguments.model.as_path()])?;
     let source = files::text(&arguments.model, "the model file")?;
     let model = model_file::of_source(&source)?;
     let (session, sources) = read_session(&arguments.session, &outputs)?;
-    let mut validation = validate_anew(&model, &session, &arguments.anew)?;
-    validation.result.volumetric_rms_um = rms_of_moved(&model, &validation.result.moved)?;
+    let given = [Given::Model(&model), Given::Session(&session)];
+    let found = Validated::run::<Failure>(&given, &arguments.options, common.seed, &|_| true)?;
+    let commands = arguments.session.commands::<Validated>(1, &ValidationOptions::default())?;
     let mut read = Read::session(&session, &sources, common.seed);
     read.files.extend(&source.stamp);
-    let stated = StatedValidation::of_validation(&validation.result);
-    let report = report::validate::report(&session, &validation, &stated, &arguments.session.commands("validate", &[]));
-    common.output.put(&outputs, &report, &stated, &read)
+    common.output.put_found(&outputs, &found, &commands, &read)
 }

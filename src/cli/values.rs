@@ -1,6 +1,6 @@
 //! Quantities that options state, each with its limits. A number that cannot be one is refused with the option.
 
-use abbe::model::component::ErrorName;
+use abbe::model::chain::Machine;
 use abbe::model::session::limits::{LARGEST, MAX_LENGTH_MM, MIN_UM};
 use abbe::model::words::number;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -113,12 +113,6 @@ pub fn count(option: &str, things: &str, value: usize, most: usize) -> Result<us
     Err(Failure::Other(format!("`{option} {value}`: a number{of} from 1 to {most} is expected")))
 }
 
-/// The name of an error of an axis.
-pub fn error_name(text: &str) -> Result<ErrorName, String> {
-    ErrorName::parse(text)
-        .ok_or_else(|| "an error of an axis according to ISO 230-1 is expected, such as EC0C".to_string())
-}
-
 /// A number of threads.
 pub fn threads() -> clap::builder::RangedI64ValueParser<u32> {
     clap::value_parser!(u32).range(1..=1024)
@@ -134,6 +128,29 @@ pub fn point_mm(option: &str, stated: &[f64], usual: [f64; 3]) -> Result<[f64; 3
         }
         _ => Err(Failure::Other(format!("`{option}`: three numbers are expected, as in 0,0,-120"))),
     }
+}
+
+/// The positions of axes that options `--at AXIS=POSITION` state, zero for the others, mm or rad.
+pub fn positions(machine: &Machine, stated: &[String]) -> Result<Vec<f64>, Failure> {
+    let mut at = vec![None; machine.axes.len()];
+    for text in stated {
+        let fault = || Failure::Other(format!("--at {text}: write an axis and its position in mm or degrees, `A=30`"));
+        let (name, number) = text.split_once('=').ok_or_else(fault)?;
+        let number: f64 = number.trim().parse().map_err(|_| fault())?;
+        POSITION.check(&format!("--at {}=", name.trim()), number)?;
+        let Some(axis) = machine.axis_index(name.trim()) else {
+            let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
+            let axes = names.join(", ");
+            return Err(Failure::Other(format!(
+                "--at {text}: the machine has no axis `{}`; its axes are {axes}",
+                name.trim()
+            )));
+        };
+        if at[axis].replace(machine.axes[axis].kind.to_internal(number)).is_some() {
+            return Err(Failure::Other(format!("--at {text}: the position of {} is stated twice", name.trim())));
+        }
+    }
+    Ok(at.into_iter().map(Option::unwrap_or_default).collect())
 }
 
 #[cfg(test)]

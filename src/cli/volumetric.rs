@@ -8,6 +8,7 @@ use abbe::files;
 use abbe::model::pattern;
 use clap::Args;
 
+use super::Global;
 use super::equation::form::FormArguments;
 use super::failure::Failure;
 use super::map::{self, MapArguments};
@@ -27,13 +28,13 @@ pub struct VolumetricArguments {
 }
 
 /// Runs `abbe volumetric`.
-pub fn run(arguments: &VolumetricArguments) -> Result<(), Failure> {
+pub fn run(arguments: &VolumetricArguments, _: Global) -> Result<(), Failure> {
     let source = files::text(&arguments.machine, "the machine file")?;
     let machine = files::machine_of(&source)?;
-    let outputs = arguments.map.output.prepared(&[arguments.form.out.as_ref(), arguments.map.file()])?;
-    let read = std::iter::once(&arguments.machine).chain(arguments.map.functions());
+    let outputs = arguments.map.output.prepared(&[arguments.form.out.as_ref(), arguments.map.map.as_ref()])?;
+    let read = std::iter::once(&arguments.machine).chain(&arguments.map.functions);
     outputs.refuse_overwrite(read.map(PathBuf::as_path))?;
-    if arguments.map.wanted() {
+    if arguments.map.map.is_some() {
         return map::run(&source, &machine, &arguments.map, &outputs);
     }
     let form = &arguments.form;

@@ -5,6 +5,8 @@
 
 use std::path::Path;
 
+use serde_json::{Map, Value};
+
 use super::provenance::quoted;
 
 /// The session with a proposed test, which a proposed command writes.
@@ -45,14 +47,21 @@ impl Commands {
         Commands { session: session.display().to_string(), ..self.clone() }
     }
 
-    /// The same for the report of a command with these options, on which its result depends: its name in a proposed
-    /// command has them too.
-    pub fn made_by(self, verb: &'static str, options: &[(&str, String)]) -> Commands {
-        let options = options.iter().map(|(option, value)| match value.as_str() {
-            "" => format!(" {option}"),
-            value => format!(" {option} {}", quoted(value.to_string())),
-        });
-        Commands { made_by: (verb, options.collect()), ..self }
+    /// The same for the report of a command with these options, by their long names, on which its result depends: its name
+    /// in a proposed command has them too.
+    pub fn made_by(self, verb: &'static str, options: &Map<String, Value>) -> Commands {
+        let written = |(name, value): (&String, &Value)| {
+            let option = format!(" --{}", name.replace('_', "-"));
+            let one = |value: &Value| match value {
+                Value::String(text) => format!("{option} {}", quoted(text.clone())),
+                Value::Number(number) if !number.is_f64() => format!("{option} {number}"),
+                // Without the zero after the point.
+                Value::Number(number) => format!("{option} {}", number.as_f64().unwrap_or_default()),
+                _ => option.clone(),
+            };
+            value.as_array().map_or_else(|| one(value), |several| several.iter().map(one).collect())
+        };
+        Commands { made_by: (verb, options.iter().map(written).collect()), ..self }
     }
 
     /// The same after a trace that has found effects.
@@ -93,6 +102,8 @@ impl Commands {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
 
     #[test]
@@ -113,9 +124,11 @@ mod tests {
     /// A command proposes itself with the options on which its result depends, and others without them.
     #[test]
     fn options_of_the_result_stay() {
-        let options = [("--only", "EZC~C:h2.5 x".to_string()), ("--planned", String::new())];
-        let commands = Commands::of(Path::new("s.toml"), None, false).made_by("trace", &options);
-        assert_eq!(commands.command("trace", "--all"), "abbe trace s.toml --only 'EZC~C:h2.5 x' --planned --all");
+        let options = json!({"only": ["EZC~C:h2.5 x", "EAC"], "max_effects": 2, "noise_um": 1.0, "planned": true});
+        let commands = Commands::of(Path::new("s.toml"), None, false).made_by("trace", options.as_object().unwrap());
+        let expected =
+            "abbe trace s.toml --only 'EZC~C:h2.5 x' --only EAC --max-effects 2 --noise-um 1 --planned --all";
+        assert_eq!(commands.command("trace", "--all"), expected);
         assert_eq!(commands.command("plan", "--improve"), "abbe plan s.toml --improve");
     }
 }

@@ -21,6 +21,8 @@ pub enum Progress {
     Folds(usize, usize),
     /// The model with the found effects is being refitted, and its residual tested.
     Judging,
+    /// Tests that separate the found effects from their aliases are being compared.
+    ComparingTests,
     /// No new event. Reported often, so that the caller can stop the trace soon.
     Working,
 }
@@ -37,6 +39,7 @@ impl Progress {
             }
             Progress::Folds(ended, folds) => format!("searching without one fold: {ended} of {folds}"),
             Progress::Judging => "refitting and judging".to_string(),
+            Progress::ComparingTests => "comparing candidate tests".to_string(),
             Progress::Contradicted(_) | Progress::Working => return None,
         })
     }

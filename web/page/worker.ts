@@ -1,6 +1,6 @@
 // The worker: holds a folder and a plan, and calls the module.
 
-import init, { Fit, Folder, Import, Plan, Trace, filesOfCode, instruments, makePool, workInPool } from "../pkg/abbe.js";
+import init, { Analysis, Folder, Import, Plan, filesOfCode, instruments, makePool, workInPool } from "../pkg/abbe.js";
 import { BROKEN, type Fault } from "./protocol";
 
 /** What a worker needs: the module, and the channel to the page for faults of its other workers. */
@@ -93,7 +93,7 @@ function open(files: Files): void {
 }
 
 /** Everything of a result as texts, so that it outlives the worker; the result itself is freed. */
-function texts(result: Fit | Trace) {
+function texts(result: Analysis) {
   try {
     const [json, report, csv] = [result.json(), result.report(), result.csv()];
     return { json, report, csv, residuals: result.residuals(), model: result.model(), ...used() };
@@ -115,9 +115,9 @@ const methods: Record<string, (...args: never[]) => unknown> = {
     }
   },
   check: (session: string) => JSON.parse(held(folder).check(session)),
-  fit: (session: string) => texts(Fit.of(held(folder), session, 1)),
+  fit: (session: string) => texts(Analysis.of("fit", held(folder), session, "{}", 1)),
   trace(session: string) {
-    const trace = Trace.of(held(folder), session, 1);
+    const trace = Analysis.of("trace", held(folder), session, "{}", 1);
     return { session: trace.session(), ...texts(trace) };
   },
   filesOfCode: (code: string) => JSON.parse(filesOfCode(code)),

@@ -1,7 +1,7 @@
 //! The WebAssembly module of the page: a folder of files in memory, and what the command does with it. Results are the
 //! JSON documents and the reports of the command.
 //!
-//! - [`folder`]: files, and the sessions in them; [`mod@import`]: foreign files as a session; [`fit`], [`trace`]: results;
+//! - [`folder`]: files, and the sessions in them; [`mod@import`]: foreign files as a session; [`analysis`]: results;
 //! - [`plan`]: a plan that changes while it is looked at;
 //! - [`pool`]: the threads of the module;
 //! - [`failed`]: errors with file, line and column.
@@ -11,11 +11,9 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::todo)
 )]
 
+mod analysis;
 mod failed;
-mod fit;
 mod folder;
 mod import;
-mod output;
 mod plan;
 mod pool;
-mod trace;

@@ -2,9 +2,10 @@
 
 use std::cell::OnceCell;
 
+use abbe::analysis::problem_of;
 use abbe::codegen::print::{LATEX, Numbering, Style};
 use abbe::codegen::{Equation, Options, Order, SessionTest, Symbols, check};
-use abbe::document::{StatedPlan, in_reading_units};
+use abbe::document::{Stated, in_reading_units};
 use abbe::equation::EquationParameters;
 use abbe::files::template;
 use abbe::identify::parameters::Role;
@@ -18,7 +19,7 @@ use abbe::model::session::Test;
 use abbe::plan::design::Goal;
 use abbe::plan::improve::{ImproveOptions, improve};
 use abbe::plan::test_variations::TestVariations;
-use abbe::plan::{self, PlanOptions, states};
+use abbe::plan::{self, PlanOptions};
 use serde_json::{Value, json};
 use wasm_bindgen::prelude::*;
 
@@ -57,8 +58,7 @@ impl Plan {
     /// If the session cannot be used, or the machine cannot carry out a test.
     pub fn of(folder: &Folder, session: &str) -> Result<Plan, Failed> {
         let read = folder.read(session, false)?;
-        let (complete, noise) = plan::prepared(&read.session, &options())?;
-        let problem = states::problem_by_test(&complete, noise)?;
+        let problem = problem_of(&read.session, &options())?;
         Ok(Plan { read, problem, nominal: OnceCell::new() })
     }
 
@@ -167,7 +167,7 @@ impl Plan {
     /// If the model cannot be evaluated.
     pub fn analysis(&self) -> Result<String, Failed> {
         let analysis = plan::analyse(&self.read.session, &options())?;
-        let stated = StatedPlan::of_plan(&self.problem, &analysis);
+        let stated = Stated { statements: analysis.statements(&self.problem), result: &analysis };
         Ok(serde_json::to_string(&stated).and_then(in_reading_units).map_err(|fault| fault.to_string())?)
     }
 

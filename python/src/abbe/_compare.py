@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from . import _abbe
 from ._fit import Fit
 from ._model import Model
 from ._shown import Shown
@@ -20,42 +18,8 @@ if TYPE_CHECKING:
 class Comparison(Shown, ComparisonResult):
     """Differences between sessions or models of one machine: the result of ``abbe compare``. :func:`compare` makes it."""
 
-    def __init__(
-        self,
-        inputs: Sequence[tuple[str, Model | Session]],
-        significance: float,
-        shared: Sequence[str] | None,
-        places: int,
-        seed: int,
-        source: dict[str, Any] | None = None,
-    ) -> None:
-        self._inputs = tuple(inputs)
-        self._options = (significance, shared, places, seed)
-        self._known: _abbe.Comparison | None = None
-        ComparisonResult.__init__(self, json.loads(self._handle.json(seed)) if source is None else source)
-
-    @property
-    def _handle(self) -> _abbe.Comparison:
-        # A comparison from another process is repeated when a figure is needed: it is deterministic.
-        if self._known is None:
-            inputs = [(name, given._handle) for name, given in self._inputs]
-            self._known = _abbe.Comparison.of(inputs, *self._options)
-        return self._known
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return (Comparison, (self._inputs, *self._options, dict(self._source)))
-
-    def _tables(self) -> list[_abbe.Table]:
-        return self._handle.tables()
-
-    def _shown(self) -> tuple[str, str]:
-        return self._handle.shown()
-
-    def _figures(self) -> list[_abbe.Figure]:
-        return self._handle.figures()
-
-    def _page(self) -> str:
-        return self._handle.page()
+    _analysis = "compare"
+    _called = "abbe.compare"
 
     def __repr__(self) -> str:
         significant = sum(pair.significant for pair in self.pairs)
@@ -94,4 +58,5 @@ def compare(
     if len(labels) != len(inputs):
         raise ValueError(f"{len(labels)} names for {len(inputs)} inputs")
     given = [item.model() if isinstance(item, (Fit, Trace)) else item for item in inputs]
-    return Comparison(list(zip(labels, given)), significance, shared, places, seed)
+    options = {"names": labels, "significance": significance, "shared": shared, "places": places}
+    return Comparison(given, options, seed)

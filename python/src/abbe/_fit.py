@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _abbe
 from ._errors import Error
 from ._model import Model
 from ._shown import Shown, Table, rows_of
@@ -60,23 +58,9 @@ class Fit(Shown, FitResult):
     ``fit["EX0C"]`` is the estimate of a parameter.
     """
 
-    def __init__(
-        self, session: Session, seed: int, allow_implausible: bool, source: dict[str, Any] | None = None
-    ) -> None:
-        self._session = session
-        self._options = (seed, allow_implausible)
-        self._known: _abbe.Fit | None = None
-        FitResult.__init__(self, json.loads(self._handle.json()) if source is None else source)
-
-    @property
-    def _handle(self) -> _abbe.Fit:
-        # A fit from another process is repeated when an array or a figure is needed: it is deterministic.
-        if self._known is None:
-            self._known = _abbe.Fit.of(self._session._handle, *self._options)
-        return self._known
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return (Fit, (self._session, *self._options, dict(self._source)))
+    _analysis = "fit"
+    _called = "abbe.Session.fit"
+    _inputs: tuple[Session]
 
     def __getitem__(self, id: str) -> ParameterResult:
         return parameter(self.parameters, id)
@@ -88,7 +72,7 @@ class Fit(Shown, FitResult):
         NaN where a parameter is not identifiable: it has no estimate of its own, and ``fit["EY0C"]`` refuses it.
         """
         known = set(self.identifiable)
-        own = np.array([parameter.id in known for parameter in self._session.parameters])
+        own = np.array([parameter.id in known for parameter in self._inputs[0].parameters])
         return np.where(own, self.solution, np.nan)
 
     @property
@@ -120,7 +104,7 @@ class Fit(Shown, FitResult):
     @property
     def residuals(self) -> ByTest:
         """Residuals observed less model in µm by test: one row for each reading, outliers included."""
-        return by_test(self._session, self._handle.residuals_um)
+        return by_test(self._inputs[0], self._handle.residuals_um)
 
     @property
     def is_outlier(self) -> ByTest:
@@ -134,18 +118,6 @@ class Fit(Shown, FitResult):
     def model(self) -> Model:
         """Return the identified model, which other sessions can validate."""
         return Model._of(self._handle.model())
-
-    def _tables(self) -> list[_abbe.Table]:
-        return self._handle.tables()
-
-    def _figures(self) -> list[_abbe.Figure]:
-        return self._handle.figures()
-
-    def _shown(self) -> tuple[str, str]:
-        return self._handle.shown()
-
-    def _page(self) -> str:
-        return self._handle.page()
 
     def __repr__(self) -> str:
         # A session of angles states its figures in arcsec.

@@ -119,7 +119,7 @@ class Model:
         session : Session
             A session of the same machine. Only its set-up is estimated.
         """
-        return Validation(self, session)
+        return Validation((self, session), {})
 
     def export(
         self,
@@ -260,20 +260,9 @@ def _column(values: ArrayLike | None, name: str) -> NDArray[np.float64] | None:
 class Validation(Shown, ValidationResult):
     """A validated model: the result of ``abbe validate``. :meth:`Model.validate` makes it."""
 
-    def __init__(self, model: Model, session: Session, source: dict[str, Any] | None = None) -> None:
-        self._model = model
-        self._session = session
-        self._known: _abbe.Validation | None = None
-        ValidationResult.__init__(self, json.loads(self._handle.json(1)) if source is None else source)
-
-    @property
-    def _handle(self) -> _abbe.Validation:
-        if self._known is None:
-            self._known = self._model._handle.validate(self._session._handle)
-        return self._known
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return (Validation, (self._model, self._session, dict(self._source)))
+    _analysis = "validate"
+    _called = "abbe.Model.validate"
+    _inputs: tuple[Model, Session]
 
     def residuals(self, test: str) -> NDArray[np.float64]:
         """Return the residuals of the model.
@@ -288,21 +277,9 @@ class Validation(Shown, ValidationResult):
         ndarray
             Observed less predicted in µm, one row for each reading.
         """
-        coordinates = next((count for name, _, count in self._session._handle.tests() if name == test), 1)
+        coordinates = next((count for name, _, count in self._inputs[1]._handle.tests() if name == test), 1)
         residuals: NDArray[np.float64] = rows_of(self._handle.residuals_um(test), coordinates)
         return residuals
-
-    def _tables(self) -> list[_abbe.Table]:
-        return self._handle.tables()
-
-    def _figures(self) -> list[_abbe.Figure]:
-        return self._handle.figures()
-
-    def _shown(self) -> tuple[str, str]:
-        return self._handle.shown()
-
-    def _page(self) -> str:
-        return self._handle.page(1)
 
     def __repr__(self) -> str:
         return f"<abbe.Validation: {self.verdict}>"

@@ -2,45 +2,18 @@
 
 from __future__ import annotations
 
-import json
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _abbe
 from ._shown import Shown
 from .results import PlanAnalysis
-
-if TYPE_CHECKING:
-    from ._session import Session
 
 
 class Plan(Shown, PlanAnalysis):
     """An analysed plan: the result of ``abbe plan``, with its arrays. :meth:`Session.plan` makes it."""
 
-    def __init__(
-        self,
-        session: Session,
-        noise_um: float | None,
-        planned: bool,
-        effects: bool,
-        source: dict[str, Any] | None = None,
-    ) -> None:
-        self._session = session
-        self._options = (noise_um, planned, effects)
-        self._known: _abbe.Plan | None = None
-        PlanAnalysis.__init__(self, json.loads(self._handle.json(1)) if source is None else source)
-
-    @property
-    def _handle(self) -> _abbe.Plan:
-        # A plan from another process is analysed again when a matrix or a figure is needed.
-        if self._known is None:
-            self._known = _abbe.Plan.of(self._session._handle, *self._options)
-        return self._known
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return (Plan, (self._session, *self._options, dict(self._source)))
+    _analysis = "plan"
+    _called = "abbe.Session.plan"
 
     @property
     def ids(self) -> tuple[str, ...]:
@@ -76,18 +49,6 @@ class Plan(Shown, PlanAnalysis):
             One row for each scalar reading, one column for each of ``ids``: µm per unit of the error.
         """
         return self._handle.sensitivity(test)
-
-    def _tables(self) -> list[_abbe.Table]:
-        return self._handle.tables()
-
-    def _figures(self) -> list[_abbe.Figure]:
-        return self._handle.figures()
-
-    def _shown(self) -> tuple[str, str]:
-        return self._handle.shown()
-
-    def _page(self) -> str:
-        return self._handle.page(1)
 
     def __repr__(self) -> str:
         return f"<abbe.Plan: {int(self.identifiable.sum())} of {len(self.errors)} errors identifiable>"

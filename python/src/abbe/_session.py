@@ -291,7 +291,7 @@ class Session(Predicting):
         allow_implausible : bool
             Accept estimates that mean nothing, though another reading of the file explains them.
         """
-        return Fit(self, seed, allow_implausible)
+        return Fit([self], {"allow_implausible": allow_implausible}, seed)
 
     def trace(
         self,
@@ -325,8 +325,14 @@ class Session(Predicting):
         allow_implausible : bool
             Accept estimates that mean nothing, though another reading of the file explains them.
         """
-        filters = texts("only", only), texts("exclude", exclude)
-        return Trace(self, progress, max_effects, *filters, time_limit, seed, allow_implausible)
+        options = {
+            "allow_implausible": allow_implausible,
+            "max_effects": max_effects,
+            "only": texts("only", only),
+            "exclude": texts("exclude", exclude),
+            "time_limit": time_limit,
+        }
+        return Trace([self], options, seed, progress=progress)
 
     def plan(self, *, noise_um: float | None = None, planned: bool = False, effects: bool = True) -> Plan:
         """Analyse identifiability and predicted uncertainty of the tests, as ``abbe plan``.
@@ -340,7 +346,7 @@ class Session(Predicting):
         effects : bool
             Screen undeclared effects.
         """
-        return Plan(self, noise_um, planned, effects)
+        return Plan([self], {"noise_um": noise_um, "planned": planned, "no_effects": not effects})
 
     def equation(
         self,

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import os
 import tempfile
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from . import _abbe
+from ._record import Record
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from ._model import Model
+    from ._session import Session
 
 
 class Table:
@@ -189,25 +195,46 @@ class Figures(tuple[Figure, ...]):
         raise KeyError(f"no figure {key!r}; the figures are {', '.join(figure.name for figure in self)}")
 
 
-class Shown:
-    """A result that is shown as tables, figures and a report."""
+class Shown(Record):
+    """The result of an analysis, which is shown as tables, figures and a report."""
 
-    def _tables(self) -> list[_abbe.Table]:
-        raise NotImplementedError
+    _analysis: ClassVar[str]
+    """The name of the command."""
+    _called: ClassVar[str]
+    """What was called in Python."""
 
-    def _figures(self) -> list[_abbe.Figure]:
-        raise NotImplementedError
+    def __init__(
+        self,
+        inputs: Sequence[Session | Model],
+        options: Mapping[str, Any],
+        seed: int = 1,
+        source: Mapping[str, Any] | None = None,
+        progress: Callable[[str], object] | None = None,
+    ) -> None:
+        self._inputs, self._options, self._seed = tuple(inputs), options, seed
+        self._known = self._analysed(progress) if source is None else None
+        super().__init__(json.loads(self._handle.json()) if source is None else source)
 
-    def _page(self) -> str:
-        raise NotImplementedError
+    def _analysed(self, progress: Callable[[str], object] | None = None) -> _abbe.Analysis:
+        # Numbers of NumPy become those of Python.
+        options = json.dumps(self._options, default=lambda value: value.tolist())
+        handles = [given._handle for given in self._inputs]
+        return _abbe.Analysis.of(self._analysis, handles, options, self._seed, progress)
 
-    def _shown(self) -> tuple[str, str]:
-        raise NotImplementedError
+    @property
+    def _handle(self) -> _abbe.Analysis:
+        # A result from another process is computed again when an array or a figure is needed: it is deterministic.
+        if self._known is None:
+            self._known = self._analysed()
+        return self._known
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (type(self), (self._inputs, self._options, self._seed, dict(self._source)))
 
     @property
     def tables(self) -> tuple[Table, ...]:
         """The tables of the result."""
-        return tuple(Table(table) for table in self._tables())
+        return tuple(Table(table) for table in self._handle.tables())
 
     @property
     def table(self) -> Table:
@@ -217,7 +244,7 @@ class Shown:
     @property
     def figures(self) -> Figures:
         """The figures of the report, by number or name."""
-        return Figures(Figure(figure) for figure in self._figures())
+        return Figures(Figure(figure) for figure in self._handle.figures())
 
     def plot(self, name: str | None = None, ax: Axes | None = None) -> Axes:
         """Draw a figure of the report with matplotlib.
@@ -246,13 +273,13 @@ class Shown:
         path : path-like
             The file. It is replaced if it exists.
         """
-        write_whole(path, self._page())
+        write_whole(path, self._handle.page(self._called))
 
     def __str__(self) -> str:
-        return self._shown()[0]
+        return self._handle.shown()[0]
 
     def _repr_html_(self) -> str:
-        return self._shown()[1]
+        return self._handle.shown()[1]
 
 
 def write_whole(path: str | os.PathLike[str], contents: str | bytes) -> None:

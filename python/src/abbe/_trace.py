@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from . import _abbe
 from ._fit import ByTest, by_test, parameter
 from ._model import Model
 from ._shown import Shown, Table
@@ -22,32 +19,9 @@ class Trace(Shown, TraceResult):
     ``trace["EX0C"]`` is the estimate of a parameter after the trace, or of a coefficient of a found effect.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        progress: Callable[[str], object] | None,
-        max_effects: int | None,
-        only: list[str],
-        exclude: list[str],
-        time_limit: float | None,
-        seed: int,
-        allow_implausible: bool,
-        source: dict[str, Any] | None = None,
-    ) -> None:
-        self._session = session
-        self._options = (max_effects, only, exclude, time_limit, seed, allow_implausible)
-        self._known = None if source is not None else _abbe.Trace.of(session._handle, progress, *self._options)
-        TraceResult.__init__(self, json.loads(self._handle.json()) if source is None else source)
-
-    @property
-    def _handle(self) -> _abbe.Trace:
-        # A trace from another process is repeated when an array or a figure is needed: it is deterministic.
-        if self._known is None:
-            self._known = _abbe.Trace.of(self._session._handle, None, *self._options)
-        return self._known
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return (Trace, (self._session, None, *self._options, dict(self._source)))
+    _analysis = "trace"
+    _called = "abbe.Session.trace"
+    _inputs: tuple[Session]
 
     def __getitem__(self, id: str) -> ParameterResult:
         of_effects = (estimate for effect in self.effects for estimate in effect.parameters)
@@ -56,12 +30,12 @@ class Trace(Shown, TraceResult):
     @property
     def residuals(self) -> ByTest:
         """Residuals of the model with the found effects in µm by test: one row for each reading."""
-        return by_test(self._session, lambda test: self._handle.residuals_um(test, False))
+        return by_test(self._inputs[0], self._handle.residuals_um)
 
     @property
     def residuals_before(self) -> ByTest:
         """Residuals of the declared model in µm by test: one row for each reading."""
-        return by_test(self._session, lambda test: self._handle.residuals_um(test, True))
+        return by_test(self._inputs[0], lambda test: self._handle.residuals_um(test, True))
 
     @property
     def is_outlier(self) -> ByTest:
@@ -78,19 +52,7 @@ class Trace(Shown, TraceResult):
 
     def session(self) -> Session:
         """Return the session with the found effects declared, as ``--write`` does."""
-        return type(self._session)._of(self._handle.session())
-
-    def _tables(self) -> list[_abbe.Table]:
-        return self._handle.tables()
-
-    def _figures(self) -> list[_abbe.Figure]:
-        return self._handle.figures()
-
-    def _shown(self) -> tuple[str, str]:
-        return self._handle.shown()
-
-    def _page(self) -> str:
-        return self._handle.page()
+        return type(self._inputs[0])._of(self._handle.session())
 
     def __repr__(self) -> str:
         return f"<abbe.Trace: {self.verdict}, {len(self.effects)} effects>"

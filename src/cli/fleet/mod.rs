@@ -4,8 +4,9 @@ mod history;
 mod run;
 mod study;
 
-use clap::Subcommand;
+use clap::{Args, Subcommand};
 
+use super::Global;
 use super::failure::Failure;
 
 /// Examples of `abbe fleet`.
@@ -14,9 +15,16 @@ pub const HELP: &str = "Examples:
   abbe fleet history results
   abbe fleet study studies/small.toml --out study";
 
+/// `abbe fleet COMMAND`
+#[derive(Args)]
+pub struct FleetArguments {
+    #[command(subcommand)]
+    command: Fleet,
+}
+
 /// The commands of `abbe fleet`.
 #[derive(Subcommand)]
-pub enum Fleet {
+enum Fleet {
     /// Analyse many sessions; a second run computes what has changed.
     #[command(after_help = run::HELP)]
     Run(run::RunArguments),
@@ -29,9 +37,9 @@ pub enum Fleet {
 }
 
 /// Runs a command of `abbe fleet`, with one thread if no number is stated.
-pub fn run(command: &Fleet, threads: Option<u32>) -> Result<(), Failure> {
-    let threads = threads.unwrap_or(1);
-    match command {
+pub fn run(arguments: &FleetArguments, global: Global) -> Result<(), Failure> {
+    let threads = global.threads.unwrap_or(1);
+    match &arguments.command {
         Fleet::Run(arguments) => run::run(arguments, threads),
         Fleet::History(arguments) => history::run(arguments),
         Fleet::Study(arguments) => study::run(arguments, threads),

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use abbe::analysis::Candidates;
 use abbe::fleet::options::Options;
 use abbe::fleet::pool::{self, Pooled};
 use abbe::fleet::run::RunResult;
@@ -15,7 +16,6 @@ use crate::cli::failure::Failure;
 use crate::cli::interrupt::Interrupts;
 use crate::cli::message::progress_bar;
 use crate::cli::results::{OutputArguments, Read};
-use crate::cli::search::SearchArguments;
 use crate::report;
 
 /// Examples of `abbe fleet run`.
@@ -46,7 +46,7 @@ pub struct RunArguments {
     #[arg(long)]
     no_trace: bool,
     #[command(flatten)]
-    search: SearchArguments,
+    search: Candidates,
     /// Folder of saved models to validate: MACHINE.json is the model of the machine with this identifier.
     ///
     /// Example: --models models

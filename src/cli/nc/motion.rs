@@ -1,7 +1,16 @@
-//! Options of NC programs, for `abbe nc` and for the sheets of its programs.
+//! Options of NC programs, for `abbe nc`, for the sheets of its programs, and for the next measurement.
 
-use abbe::codegen::nc::NcOptions;
+use abbe::apply::control::CONTROLS;
+use abbe::codegen::nc::{self, NcOptions};
 use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+
+/// The controls with NC programs.
+pub fn controls() -> impl TypedValueParser<Value = &'static dyn nc::Control> {
+    let known = CONTROLS.iter().filter(|control| control.has_programs);
+    let words = known.map(|control| PossibleValue::new(control.word).help(control.name));
+    PossibleValuesParser::new(words).try_map(|word| nc::control(&word))
+}
 
 /// How programs move.
 #[derive(Args)]
@@ -73,5 +82,18 @@ impl MotionArguments {
             number: self.program_number,
             tool_point: self.tool_point,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every dialect is that of a control of the registry, and the other way round.
+    #[test]
+    fn controls_with_programs_are_those_with_a_dialect() {
+        let dialects = nc::CONTROLS.map(nc::Control::word);
+        let controls: Vec<&str> = CONTROLS.iter().filter(|own| own.has_programs).map(|own| own.word).collect();
+        assert_eq!(dialects[..], controls);
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use abbe::analysis::problem_of;
 use abbe::identify::problem::Problem;
 use abbe::model::effect::Effect;
 use abbe::model::session::Session;
@@ -23,8 +24,7 @@ const BIASING_EFFECTS: usize = 12;
 pub fn study(arguments: &PaperArguments, label: String, session: &Session) -> Result<Study, Failure> {
     let options = PlanOptions { effects: false, ..PlanOptions::default() };
     let analysis = plan::analyse(session, &options)?;
-    let (complete, noise) = plan::prepared(session, &options)?;
-    let problem = plan::states::problem_by_test(&complete, noise)?;
+    let problem = problem_of(session, &options)?;
     let bias = if arguments.effects.is_empty() {
         bias_table(&problem, &usual_effects(&problem)?)?.largest(BIASING_EFFECTS)
     } else {

@@ -13,7 +13,7 @@ pub struct GlobalArguments {
     /// Sobol' indices of each identified error by set-up errors, noise and undeclared effects, with the full fit,
     /// beside the linear prediction.
     #[arg(long, conflicts_with_all = ["improve", "separate", "range", "patterns", "device_mm"])]
-    global: bool,
+    pub global: bool,
     /// Size of an input of --global: half the range of an undeclared effect, or the standard deviation of a set-up
     /// parameter instead of its prior; may be repeated.
     ///
@@ -31,11 +31,6 @@ pub struct GlobalArguments {
 const MAX_SAMPLES: usize = 1 << 16;
 
 impl GlobalArguments {
-    /// Whether the analysis is requested.
-    pub fn asked(&self) -> bool {
-        self.global
-    }
-
     /// Analyses a plan.
     pub fn run(&self, problem: &Problem, seed: u64) -> Result<GlobalAnalysis, Failure> {
         if !self.samples.is_power_of_two() || !(8..=MAX_SAMPLES).contains(&self.samples) {

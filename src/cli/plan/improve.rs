@@ -33,12 +33,12 @@ pub struct ImproveArguments {
     #[arg(long, value_name = "A,B", allow_hyphen_values = true)]
     separate: Option<String>,
     #[command(flatten)]
-    candidates: CandidateArguments,
+    pub candidates: CandidateArguments,
     /// Write the session with the result in it: the proposed tests stand at its end, with all positions.
     ///
     /// Example: --improve 2 --write next.toml
     #[arg(long, value_name = "FILE", requires = "next_test")]
-    write: Option<PathBuf>,
+    pub write: Option<PathBuf>,
 }
 
 impl ImproveArguments {
@@ -57,11 +57,6 @@ impl ImproveArguments {
         }
     }
 
-    /// The file of the session with the proposed tests.
-    pub fn file(&self) -> Option<&PathBuf> {
-        self.write.as_ref()
-    }
-
     /// Writes the session with the proposed tests, if requested.
     pub fn write(&self, found: &Improvement, sources: &SourceMap, session: &SessionArguments) -> Result<(), Failure> {
         let Some(path) = &self.write else {
@@ -74,11 +69,6 @@ impl ImproveArguments {
         next_session::write(path, sources, session, |text| {
             found.steps.iter().try_for_each(|step| text.add_block(&step.proposal))
         })
-    }
-
-    /// Travel of the sensor in the bar, in each direction, mm.
-    pub fn reach_mm(&self) -> Result<f64, Failure> {
-        self.candidates.reach_mm()
     }
 
     /// Proposes tests, if they are requested.

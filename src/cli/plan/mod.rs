@@ -1,21 +1,19 @@
 //! `abbe plan`: analyse identifiability and predicted uncertainty of planned tests.
 
-mod clearance;
 mod global;
 mod improve;
-mod overrides;
 mod patterns;
+mod set_up;
 
-use abbe::document::StatedPlan;
-use abbe::plan::collision;
+use abbe::analysis::{Plan, PlanningOptions, problem_of};
+use abbe::plan::PlanOptions;
 use abbe::plan::next_test::NextTest;
 use abbe::plan::range::shrinkages;
-use abbe::plan::{self, PlanOptions};
 use clap::Args;
 
 use super::failure::Failure;
 use super::results::Read;
-use super::{CommonArguments, SessionArguments, read_session, values};
+use super::{CommonArguments, Global, SessionArguments, read_session, values};
 use crate::report;
 
 /// `abbe plan SESSION`
@@ -65,17 +63,17 @@ pub struct PlanArguments {
 pub const HELP: &str = include_str!("../help/plan.txt");
 
 /// Runs `abbe plan`.
-pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
+pub fn run(arguments: &PlanArguments, _: Global) -> Result<(), Failure> {
     let common = &arguments.common;
-    let others = [arguments.patterns.file(), arguments.improve.file()];
-    let outputs = common.output.prepared(&others)?;
+    let others = [&arguments.patterns.patterns, &arguments.improve.write];
+    let outputs = common.output.prepared(&others.map(Option::as_ref))?;
     // The written session has the mounts and the priors of the file, not those of the command line.
     arguments.improve.refuse_overrides(arguments.one_spindle_ball || arguments.setup_um.is_some())?;
     let (mut session, sources) = read_session(&arguments.session, &outputs)?;
-    overrides::apply(&mut session, arguments.setup_um, arguments.one_spindle_ball)?;
+    set_up::apply(&mut session, arguments.setup_um, arguments.one_spindle_ball)?;
     let session = session;
     let read = Read::session(&session, &sources, common.seed);
-    if arguments.patterns.asked() {
+    if arguments.patterns.patterns.is_some() {
         let found = arguments.patterns.run(&session)?;
         return common.output.put(&outputs, &report::patterns::report(&session, &found.patterns), &found, &read);
     }
@@ -83,11 +81,10 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         noise_mm: arguments.noise_um.map(|um| values::length_um("--noise-um", um)).transpose()?,
         planned_only: arguments.planned,
         effects: !arguments.no_effects,
-        reach_mm: arguments.improve.reach_mm()?,
+        reach_mm: arguments.improve.candidates.reach_mm()?,
     };
-    let (complete, noise) = plan::prepared(&session, &options)?;
-    let problem = plan::states::problem_by_test(&complete, noise)?;
-    if arguments.global.asked() {
+    let problem = problem_of(&session, &options)?;
+    if arguments.global.global {
         let found = arguments.global.run(&problem, common.seed)?;
         return common.output.put(&outputs, &report::plan::global::report(&session, &found), &found, &read);
     }
@@ -100,16 +97,11 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         let found = NextTest::new(&problem, improvement, ranges);
         return common.output.put(&outputs, &report::next_test::report(&problem, &found), &found, &read);
     }
-    let mut analysis = plan::analyse(&session, &options)?;
-    analysis.warnings.extend(collision::unchecked(&session, options.planned_only));
+    let mut found = Plan::of(&session, problem, &options)?;
     if let Some(sizes) = &arguments.device_mm {
-        analysis.warnings.extend(clearance::faults(&session, sizes)?);
+        found.analysis.warnings.extend(set_up::faults(&session, sizes)?);
     }
-    let noise = arguments.noise_um.map(|um| ("--noise-um", um.to_string()));
-    let planned = arguments.planned.then(|| ("--planned", String::new()));
-    let repeated: Vec<(&str, String)> = noise.into_iter().chain(planned).collect();
-    let commands = arguments.session.commands("plan", &repeated);
-    let stated = StatedPlan::of_plan(&problem, &analysis);
-    let report = report::plan::analysis::report(&problem, &stated, &commands, common.output.figures())?;
-    common.output.put(&outputs, &report, &stated, &read)
+    let &PlanArguments { noise_um, planned, .. } = arguments;
+    let commands = arguments.session.commands::<Plan>(1, &PlanningOptions { noise_um, planned, no_effects: false })?;
+    common.output.put_found(&outputs, &found, &commands, &read)
 }

@@ -22,7 +22,7 @@ pub struct PatternArguments {
         value_name = "FILE.csv",
         conflicts_with_all = ["improve", "separate", "range", "device_mm", "noise_um", "setup_um"]
     )]
-    patterns: Option<PathBuf>,
+    pub patterns: Option<PathBuf>,
     /// Value of an error; may be repeated [default of --patterns: all errors that the session estimates, 10 µm and 0.01°].
     ///
     /// Example: --patterns patterns.csv --error EY0A=10um --error EB0A=0.01deg
@@ -31,16 +31,6 @@ pub struct PatternArguments {
 }
 
 impl PatternArguments {
-    /// The file of the patterns.
-    pub fn file(&self) -> Option<&PathBuf> {
-        self.patterns.as_ref()
-    }
-
-    /// Whether patterns are requested.
-    pub fn asked(&self) -> bool {
-        self.patterns.is_some()
-    }
-
     /// Writes the patterns.
     pub fn run(&self, session: &Session) -> Result<Patterns, Failure> {
         let given: Vec<Given> = self.errors.iter().map(|text| Given::parse(text)).collect::<Result<_, _>>()?;

@@ -1,36 +1,23 @@
 //! The time of a trace: its limit, and the time that a stage is expected to take.
 
 use std::sync::Mutex;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use crate::cli::values;
 
-/// A clock that runs from the start of a command.
-pub struct Clock {
-    start: Instant,
-    limit: Option<Duration>,
-    /// When the searches without one fold began.
-    folds: Mutex<Instant>,
-}
+/// When the searches without one fold began.
+pub struct Folds(Mutex<Instant>);
 
-impl Clock {
-    /// Starts a clock with a limit in seconds.
-    pub fn started(limit_s: Option<f64>) -> Clock {
-        let start = Instant::now();
-        // A limit beyond what a duration can hold is no limit.
-        let limit = limit_s.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-        Clock { start, limit, folds: Mutex::new(start) }
-    }
-
-    /// Whether the limit has passed.
-    pub fn has_run_out(&self) -> bool {
-        self.limit.is_some_and(|limit| self.start.elapsed() >= limit)
+impl Folds {
+    /// They begin from now on.
+    pub fn started() -> Folds {
+        Folds(Mutex::new(Instant::now()))
     }
 
     /// The stage of the searches without one fold, of which so many have ended, and the time that the others are
     /// expected to take.
     pub fn remaining(&self, ended: usize, folds: usize) -> String {
-        let Ok(mut began) = self.folds.lock() else { return String::new() };
+        let Ok(mut began) = self.0.lock() else { return String::new() };
         if ended <= 1 {
             *began = Instant::now();
         }
@@ -49,14 +36,6 @@ pub fn seconds(text: &str) -> Result<f64, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_clock_runs_out_only_with_a_limit() {
-        assert!(!Clock::started(None).has_run_out());
-        assert!(!Clock::started(Some(1e300)).has_run_out());
-        assert!(!Clock::started(Some(3600.0)).has_run_out());
-        assert!(Clock::started(Some(1e-9)).has_run_out());
-    }
 
     #[test]
     fn a_limit_is_a_positive_number() {

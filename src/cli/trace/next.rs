@@ -13,8 +13,9 @@ use clap::Args;
 
 use crate::cli::failure::Failure;
 use crate::cli::message::{Kind, tell};
+use crate::cli::nc::motion;
 use crate::cli::next_session::proposals;
-use crate::cli::{again, controls, folder};
+use crate::cli::{again, folder};
 
 /// The next measurement.
 #[derive(Args)]
@@ -28,7 +29,7 @@ pub struct NextArguments {
     /// The control of the NC programs: they are written beside the session.
     ///
     /// Example: --next next --control fanuc
-    #[arg(long, value_name = "CONTROL", value_parser = controls::with_programs(), requires = "next")]
+    #[arg(long, value_name = "CONTROL", value_parser = motion::controls(), requires = "next")]
     control: Option<&'static dyn Control>,
 }
 

@@ -3,16 +3,14 @@
 use std::sync::Mutex;
 use std::time::Duration;
 
+use abbe::analysis::{Analysis, Given, Progress, SearchOptions};
 use abbe::model::session::Session;
 use abbe::model::words::counted;
-use abbe::plan::separating_tests::separate_aliases;
-use abbe::plan::test_variations::TestVariations;
 use abbe::trace::candidates::library;
-use abbe::trace::{self, Progress, TraceOptions, TraceOutcome};
+use abbe::trace::{self, TraceOptions, TraceOutcome};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::clock::Clock;
-use crate::cli::PlausibilityArguments;
+use super::clock::Folds;
 use crate::cli::failure::Failure;
 use crate::cli::interrupt::Interrupts;
 use crate::cli::message::{Kind, tell};
@@ -21,55 +19,33 @@ use crate::cli::message::{Kind, tell};
 /// or the user interrupts.
 ///
 /// # Errors
-/// If the session cannot be fitted, or its estimates mean nothing and `plausibility` does not accept it.
-pub fn trace(
-    session: &Session,
-    options: &TraceOptions,
-    plausibility: PlausibilityArguments,
-    (time_limit, quiet): (Option<f64>, bool),
-) -> Result<TraceOutcome, Failure> {
-    let clock = Clock::started(time_limit);
+/// If the session cannot be fitted, or its estimates mean nothing and the options do not accept it.
+pub fn trace(session: &Session, options: &SearchOptions, seed: u64, quiet: bool) -> Result<TraceOutcome, Failure> {
+    let folds = Folds::started();
     let bar = progress_bar(quiet);
     let interrupts = Interrupts::handled(bar.clone());
     let shown = Mutex::new(());
-    let refused: Mutex<Option<Failure>> = Mutex::new(None);
-    let report = |progress: Progress| {
-        if let Progress::Contradicted(found) = &progress
-            && let Err(failure) = plausibility.check(found)
-            && let Ok(mut refused) = refused.lock()
-        {
-            *refused = Some(failure);
-            return false;
-        }
+    let listener = |progress: Progress| {
         let Some(words) = progress.words() else {
             // Called often and from many threads; it shows nothing.
             interrupts.keep_results();
-            return !interrupts.came() && !clock.has_run_out();
+            return !interrupts.came();
         };
         let _one_at_a_time = shown.lock();
         match &progress {
-            Progress::Folds(ended, folds) => bar.set_message(clock.remaining(*ended, *folds)),
+            Progress::Folds(ended, all) => bar.set_message(folds.remaining(*ended, *all)),
             Progress::SelectedEffect(_, id, rms, unit) if !quiet => {
                 bar.suspend(|| eprintln!("  + {id:<28} held out {}", unit.text(*rms, 3)));
                 bar.set_message(words);
             }
             _ => bar.set_message(words),
         }
-        !interrupts.came() && !clock.has_run_out()
+        !interrupts.came()
     };
-    let mut trace = trace::trace(session, options, &report)?;
-    if let Some(failure) = refused.lock().ok().and_then(|mut refused| refused.take()) {
-        bar.finish_and_clear();
-        return Err(failure);
-    }
-    bar.set_message("comparing candidate tests");
-    separate_aliases(&mut trace, &TestVariations::short(), &report)?;
+    let trace = TraceOutcome::run::<Failure>(&[Given::Session(session)], options, seed, &listener);
     interrupts.end_at_once();
     bar.finish_and_clear();
-    if let Some(seconds) = time_limit.filter(|_| !interrupts.came()) {
-        trace.result.mark_time_limit(seconds);
-    }
-    Ok(trace)
+    trace
 }
 
 /// Says that the model of a trace that ended early is not saved.

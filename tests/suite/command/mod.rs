@@ -1,5 +1,6 @@
 //! The command as a program: help, files, signals, faults, kept answers.
 
+pub mod analyses;
 pub mod another_build;
 pub mod early_returns;
 pub mod examples;

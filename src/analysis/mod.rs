@@ -1,0 +1,214 @@
+//! Analyses: from options to a result, and from the result to its document, its report and its tables.
+//!
+//! The command line, Python and the page are loops over them. An analysis is one file with its options, and one line of
+//! `lines`.
+
+mod compare;
+mod fit;
+mod plan;
+mod trace;
+mod validate;
+
+use std::any::Any;
+
+use abbe_apply::ApplyError;
+use abbe_identify::IdentifyError;
+use abbe_identify::fit::Fit;
+use abbe_identify::model_file::IdentifiedModel;
+use abbe_identify::problem::Problem;
+use abbe_model::ModelError;
+use abbe_model::session::Session;
+use abbe_plan::PlanError;
+pub use abbe_trace::Progress;
+use abbe_trace::{SessionFit, TraceOutcome};
+pub use compare::{Compared, ComparisonOptions};
+pub use fit::FitOptions;
+pub use plan::{Plan, PlanningOptions, problem_of};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+pub use trace::{Candidates, SearchOptions};
+pub use validate::{Validated, ValidationOptions};
+
+use crate::document::{Call, Origin};
+use crate::report::block::Report;
+use crate::report::commands::Commands;
+use crate::report::table::Table;
+
+/// What is analysed.
+#[derive(Clone, Copy)]
+pub enum Given<'g> {
+    /// A session.
+    Session(&'g Session),
+    /// A saved model.
+    Model(&'g IdentifiedModel),
+}
+
+/// Hears what is done, and answers whether to go on.
+pub type Listener<'l> = &'l (dyn Fn(Progress) -> bool + Sync);
+
+/// The error of a caller, which those of all crates become.
+pub trait Fault: From<IdentifyError> + From<PlanError> + From<ApplyError> + From<String> {}
+
+impl<E: From<IdentifyError> + From<PlanError> + From<ApplyError> + From<String>> Fault for E {}
+
+/// An analysis.
+pub trait Analysis: Found + Sized {
+    /// The name of its command.
+    const NAME: &'static str;
+
+    /// The options on which the result depends, by their long names on the command line.
+    type Options: Default + Serialize + DeserializeOwned;
+
+    /// Analyses what is given. The seed is that of all random numbers.
+    ///
+    /// # Errors
+    /// If something else is given than the analysis takes, or it cannot be analysed.
+    fn run<E: Fault>(
+        given: &[Given<'_>],
+        options: &Self::Options,
+        seed: u64,
+        listener: Listener<'_>,
+    ) -> Result<Self, E>;
+}
+
+/// What an analysis found.
+pub trait Found: Any + Send + Sync {
+    /// The document of `--json`.
+    ///
+    /// # Errors
+    /// If the result is no JSON, in words.
+    fn document(&self, call: Call, origin: Origin, seed: Option<u64>) -> Result<String, String>;
+
+    /// The report: the screen, and the page with its figures if they are wanted. It proposes `commands`.
+    ///
+    /// # Errors
+    /// If the model cannot be evaluated.
+    fn report(&self, commands: &Commands, figures: bool) -> Result<Report, IdentifyError>;
+
+    /// The tables of the figures that the result is about.
+    fn tables(&self) -> Vec<Table>;
+
+    /// The fits: one before and one after, or one, or none. The last is that of the result.
+    fn fits(&self) -> Vec<(&Problem, &Fit)> {
+        Vec::new()
+    }
+
+    /// Residuals observed less model of the tests by name, mm: all coordinates of a reading together. `before` is that of
+    /// the model with which the analysis began.
+    fn residuals_mm(&self, before: bool) -> Vec<(&str, &[f64])> {
+        let fits = self.fits();
+        let Some((problem, fit)) = (if before { fits.first() } else { fits.last() }) else { return Vec::new() };
+        problem.tests.iter().map(|test| test.name.as_str()).zip(fit.residuals.iter().map(Vec::as_slice)).collect()
+    }
+
+    /// Why the model of the result is not to be saved.
+    fn incomplete(&self) -> Option<String> {
+        None
+    }
+}
+
+/// A result with the call that gives it again.
+pub struct Analysed {
+    /// The name of the analysis, and the options that are not those of every call.
+    pub call: Call,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// The result.
+    pub found: Box<dyn Found>,
+}
+
+/// An analysis for a caller that chooses it by name: the options are a JSON object.
+struct Line<E> {
+    name: &'static str,
+    run: fn(&[Given<'_>], &str, u64, Listener<'_>) -> Result<(Map<String, Value>, Box<dyn Found>), E>,
+}
+
+fn line<A: Analysis, E: Fault>() -> Line<E> {
+    Line {
+        name: A::NAME,
+        run: |given, options, seed, listener| {
+            let unusable = |cause: serde_json::Error| {
+                unusable::<E>(format!("an option of `{}` cannot be used: {cause}", A::NAME), "")
+            };
+            let options: A::Options = serde_json::from_str(options).map_err(unusable)?;
+            let stated = stated(&options).map_err(unusable)?;
+            Ok((stated, Box::new(A::run::<E>(given, &options, seed, listener)?)))
+        },
+    }
+}
+
+/// The analyses.
+fn lines<E: Fault>() -> [Line<E>; 5] {
+    [
+        line::<SessionFit, E>(),
+        line::<TraceOutcome, E>(),
+        line::<Plan, E>(),
+        line::<Validated, E>(),
+        line::<Compared, E>(),
+    ]
+}
+
+/// The options that differ from those of a call that states none.
+///
+/// # Errors
+/// If they are no JSON object.
+pub fn stated<O: Default + Serialize>(options: &O) -> serde_json::Result<Map<String, Value>> {
+    let usual = serde_json::to_value(O::default())?;
+    let mut stated: Map<String, Value> = serde_json::from_value(serde_json::to_value(options)?)?;
+    stated.retain(|name, value| usual.get(name.as_str()) != Some(&*value));
+    Ok(stated)
+}
+
+/// Runs the analysis of a name; the options are a JSON object.
+///
+/// # Errors
+/// If there is no such analysis or option, and as [`Analysis::run`].
+pub fn run<E: Fault>(
+    name: &str,
+    given: &[Given<'_>],
+    options: &str,
+    seed: u64,
+    listener: Listener<'_>,
+) -> Result<Analysed, E> {
+    let line = lines::<E>().into_iter().find(|line| line.name == name);
+    let line = line.ok_or_else(|| E::from(format!("there is no analysis `{name}`")))?;
+    let (options, found) = (line.run)(given, options, seed, listener)?;
+    Ok(Analysed { call: Call { command: name.to_string(), options }, seed, found })
+}
+
+/// An option or an input that cannot be used, and what is expected.
+fn unusable<E: Fault>(message: String, expected: &str) -> E {
+    IdentifyError::from(ModelError::Session { message, help: expected.to_string() }).into()
+}
+
+/// The session of an analysis that takes one.
+fn session_of<'g, E: Fault>(given: &[Given<'g>]) -> Result<&'g Session, E> {
+    match given {
+        [Given::Session(session)] => Ok(session),
+        _ => Err(unusable("one session is expected".to_string(), "")),
+    }
+}
+
+impl Analysed {
+    /// The document of `--json`.
+    ///
+    /// # Errors
+    /// If the result is no JSON, in words.
+    pub fn document(&self, origin: Origin) -> Result<String, String> {
+        self.found.document(self.call.clone(), origin, Some(self.seed))
+    }
+
+    /// The model of `--save`.
+    ///
+    /// # Errors
+    /// If the result has none, or it is incomplete.
+    pub fn model<E: Fault>(&self, origin: &Origin) -> Result<IdentifiedModel, E> {
+        if let Some(why) = self.found.incomplete() {
+            return Err(format!("no model: {why}, and effects may be missing from it").into());
+        }
+        let fits = self.found.fits();
+        let (problem, fit) = fits.last().ok_or_else(|| format!("a result of `{}` has no model", self.call.command))?;
+        Ok(IdentifiedModel::of_fit(problem, fit, origin.provenance(self.call.clone(), self.seed))?)
+    }
+}

@@ -1,0 +1,28 @@
+//! `abbe completions`: what a shell completes.
+
+use clap::{Args, CommandFactory};
+
+use super::failure::Failure;
+use super::{Arguments, Global, output};
+
+/// An example of `abbe completions`.
+pub const HELP: &str = "Example:
+  abbe completions bash
+
+Save the output where the shell finds it: ~/.local/share/bash-completion/completions/abbe (bash), a folder of $fpath as _abbe (zsh),
+~/.config/fish/completions/abbe.fish (fish).";
+
+/// `abbe completions SHELL`
+#[derive(Args)]
+pub struct CompletionArguments {
+    /// The shell.
+    shell: clap_complete::Shell,
+}
+
+/// Runs `abbe completions`.
+pub fn run(arguments: &CompletionArguments, _: Global) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut Arguments::command(), "abbe", &mut script);
+    output::whole(String::from_utf8_lossy(&script).trim_end());
+    Ok(())
+}
