@@ -4,7 +4,6 @@ use abbe_apply::compare::workspace::rms_of_moved;
 use abbe_identify::IdentifyError;
 use abbe_identify::results::Statements;
 use abbe_model::component::ErrorName;
-use abbe_model::session::Session;
 use abbe_trace::validate::{Validation, validate_anew};
 use serde::{Deserialize, Serialize};
 
@@ -39,7 +38,7 @@ fn known_error(name: &str) -> Result<String, String> {
 
 /// A validated model.
 pub struct Validated {
-    session: Session,
+    machine: String,
     validation: Validation,
 }
 
@@ -54,7 +53,7 @@ impl Analysis for Validated {
         let anew = options.anew.iter().map(|name| error(name)).collect::<Result<Vec<_>, _>>()?;
         let mut validation = validate_anew(model, session, &anew)?;
         validation.result.volumetric_rms_um = rms_of_moved(model, &validation.result.moved)?;
-        Ok(Validated { session: (*session).clone(), validation })
+        Ok(Validated { machine: session.machine.name.clone(), validation })
     }
 }
 
@@ -71,7 +70,7 @@ impl Found for Validated {
     }
 
     fn report(&self, commands: &Commands, _: bool) -> Result<Report, IdentifyError> {
-        Ok(present::report(&self.session, &self.validation, &self.stated(), commands))
+        Ok(present::report(&self.machine, &self.validation, &self.stated(), commands))
     }
 
     fn tables(&self) -> Vec<Table> {

@@ -3,7 +3,6 @@
 use abbe::document::StatedValidation;
 use abbe::identify::results::validation::RmsResult;
 use abbe::identify::results::validation::{ValidationResult, ValidationVerdict};
-use abbe::model::session::Session;
 use abbe::model::words::counted;
 use abbe::trace::validate::Validation;
 
@@ -26,14 +25,9 @@ const METHOD: &str = "The errors of the machine are those of the saved model. On
      readings, and no parameter has moved (generalised least squares, 0.5 % over all parameters, Bonferroni).";
 
 /// The report of a validation.
-pub fn report(
-    session: &Session,
-    validation: &Validation,
-    stated: &StatedValidation<'_>,
-    commands: &Commands,
-) -> Report {
+pub fn report(machine: &str, validation: &Validation, stated: &StatedValidation<'_>, commands: &Commands) -> Report {
     let result = stated.result;
-    let mut report = Report::new(format!("Validation of a model of {}", session.machine.name));
+    let mut report = Report::new(format!("Validation of a model of {machine}"));
     report.warnings.clone_from(&result.warnings);
     report.method = METHOD.to_string();
     let sentence = format!("{}.", capitalised(&sentence(result)));
