@@ -4,10 +4,15 @@ mod history;
 mod run;
 mod study;
 
+use abbe::fleet::FleetError;
+use abbe::fleet::pool::{self, Pooled, ShouldContinue};
+use abbe::fleet::store::IfClaimed;
 use clap::{Args, Subcommand};
 
 use super::Global;
 use super::failure::Failure;
+use super::interrupt::Interrupts;
+use super::message::progress_bar;
 
 /// Examples of `abbe fleet`.
 pub const HELP: &str = "Examples:
@@ -44,4 +49,26 @@ pub fn run(arguments: &FleetArguments, global: Global) -> Result<(), Failure> {
         Fleet::History(arguments) => history::run(arguments),
         Fleet::Study(arguments) => study::run(arguments, threads),
     }
+}
+
+/// Does all units, which a bar counts: the results, and what ended the work before. The words are what the units are, and
+/// how many.
+fn all<U: Sync, T: Send>(
+    units: &[U],
+    (things, count): (&str, String),
+    (threads, quiet): (u32, bool),
+    unit: impl Fn(&U, IfClaimed, ShouldContinue<'_>) -> Result<Option<T>, FleetError> + Sync,
+) -> (Vec<T>, Result<(), Failure>) {
+    let (bar, interrupts) = (progress_bar(units.len(), things, quiet), Interrupts::noticed());
+    let Pooled { done, ended } = pool::all(units, threads as usize, &|| !interrupts.came(), unit, &|| bar.inc(1));
+    bar.finish_and_clear();
+    let ended = match ended {
+        None => Ok(()),
+        Some(FleetError::Interrupted) => {
+            let message = format!("interrupted: {} of {count} done; the same command continues", done.len());
+            Err(Failure::Interrupted(message))
+        }
+        Some(error) => Err(error.into()),
+    };
+    (done, ended)
 }

@@ -3,18 +3,16 @@
 use std::path::PathBuf;
 
 use abbe::analysis::Candidates;
+use abbe::fleet::list;
 use abbe::fleet::options::Options;
-use abbe::fleet::pool::{self, Pooled};
 use abbe::fleet::run::RunResult;
 use abbe::fleet::store::Store;
 use abbe::fleet::unit::{self, Places};
-use abbe::fleet::{FleetError, list};
 use abbe::model::words::counted;
 use clap::Args;
 
+use super::all;
 use crate::cli::failure::Failure;
-use crate::cli::interrupt::Interrupts;
-use crate::cli::message::progress_bar;
 use crate::cli::results::{OutputArguments, Read};
 use crate::report;
 
@@ -86,24 +84,11 @@ pub fn run(arguments: &RunArguments, threads: u32) -> Result<(), Failure> {
         exclude: arguments.search.exclude.clone(),
     };
     let places = Places { models: arguments.models.clone(), allow_outside: arguments.allow_outside };
-    let (bar, interrupts) = (progress_bar(files.len(), "sessions", arguments.output.quiet), Interrupts::noticed());
-    let Pooled { done, ended } = pool::all(
-        &files,
-        threads as usize,
-        &|| !interrupts.came(),
-        |file, if_claimed, should_continue| unit::run(file, &options, &places, &store, if_claimed, should_continue),
-        &|| bar.inc(1),
-    );
-    bar.finish_and_clear();
+    let words = ("sessions", counted(files.len(), "session"));
+    let (done, ended) = all(&files, words, (threads, arguments.output.quiet), |file, if_claimed, should_continue| {
+        unit::run(file, &options, &places, &store, if_claimed, should_continue)
+    });
     let result = RunResult::of(&arguments.out, files.len(), &done, forgotten);
     arguments.output.put(&outputs, &report::run::report(&result), &result, &Read::default())?;
-    match ended {
-        None => Ok(()),
-        Some(FleetError::Interrupted) => Err(Failure::Interrupted(format!(
-            "interrupted: {} of {} done; the same command continues",
-            done.len(),
-            counted(files.len(), "session")
-        ))),
-        Some(error) => Err(error.into()),
-    }
+    ended
 }

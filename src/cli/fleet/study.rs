@@ -2,16 +2,14 @@
 
 use std::path::PathBuf;
 
-use abbe::fleet::pool::{self, Pooled};
 use abbe::fleet::store::Store;
+use abbe::fleet::study;
 use abbe::fleet::study::file;
 use abbe::fleet::study::summary::summary;
-use abbe::fleet::{FleetError, study};
 use clap::Args;
 
+use super::all;
 use crate::cli::failure::Failure;
-use crate::cli::interrupt::Interrupts;
-use crate::cli::message::progress_bar;
 use crate::cli::results::{OutputArguments, Read};
 use crate::report::study as present;
 
@@ -41,25 +39,13 @@ pub fn run(arguments: &StudyArguments, threads: u32) -> Result<(), Failure> {
     let store = Store::open(&arguments.out)?;
     store.remove_stale();
     let numbers: Vec<usize> = (0..study.draws()).collect();
-    let (bar, interrupts) = (progress_bar(numbers.len(), "draws", arguments.output.quiet), Interrupts::noticed());
-    let Pooled { done: draws, ended } = pool::all(
-        &numbers,
-        threads as usize,
-        &|| !interrupts.came(),
-        |number, if_claimed, should_continue| {
+    let words = ("draws", numbers.len().to_string());
+    let (draws, ended) =
+        all(&numbers, words, (threads, arguments.output.quiet), |number, if_claimed, should_continue| {
             let draw = study::run(&study, *number, &store, if_claimed, should_continue)?;
             Ok(draw.map(|(_, draw)| draw))
-        },
-        &|| bar.inc(1),
-    );
-    match ended {
-        None => bar.finish_and_clear(),
-        Some(FleetError::Interrupted) => {
-            let message = format!("interrupted: {} of {} done; the same command continues", draws.len(), numbers.len());
-            return Err(Failure::Interrupted(message));
-        }
-        Some(error) => return Err(error.into()),
-    }
+        });
+    ended?;
     let result = summary(&draws);
     let failed = draws.iter().find(|draw| draw.error.is_some());
     let read = Read { seed: Some(study.file.study.seed), ..Read::files(&study.stamp) };
