@@ -96,6 +96,7 @@ impl Statements<ValidationStatement, MovedParameter> {
     /// Of a validation.
     pub fn of_validation(result: &ValidationResult) -> Self {
         let step = match result.verdict {
+            _ if result.not_judged.is_some() => NextStep::Trace,
             ValidationVerdict::Holds => NextStep::Nothing,
             ValidationVerdict::HoldsInRange => NextStep::WidenRange,
             ValidationVerdict::Degraded | ValidationVerdict::DoesNotHold => NextStep::Refit,

@@ -13,6 +13,8 @@ use super::provenance::quoted;
 pub const NEXT: &str = "next.toml";
 /// The session with the found effects.
 pub const TRACED: &str = "traced.toml";
+/// The model with the found effects.
+pub const TRACED_MODEL: &str = "traced-model.json";
 /// The folder of what a trace proposes to measure.
 pub const MEASURE: &str = "measure-next";
 /// The folder of the NC programs of [`NEXT`].

@@ -8,7 +8,7 @@ use abbe::apply::compare::results::{Comparison, Difference};
 use abbe::codegen::nc::has_letters;
 #[cfg(feature = "fleet")]
 use abbe::fleet::history::{ChangedInHistory, HistoryStatements};
-use abbe::identify::results::validation::{MovedParameter, ValidationResult, ValidationVerdict};
+use abbe::identify::results::validation::{ModelNotJudged, MovedParameter, ValidationResult, ValidationVerdict};
 use abbe::identify::results::{
     AxisCorrection, DeterminedBy, GoodStatement, LineQuantity, MeasureStatement, NextStep, NotJudged, ParameterResult,
     Statements, ValidationStatement,
@@ -21,7 +21,7 @@ use abbe::plan::PlanStatement;
 use abbe::plan::results::{Contribution, ErrorAnalysis, PlanAnalysis};
 
 use super::block::Sentence;
-use super::commands::{Commands, MEASURE, NEXT, PROGRAMS};
+use super::commands::{Commands, MEASURE, NEXT, PROGRAMS, TRACED, TRACED_MODEL};
 use super::number::{fixed, places, quantity, three_digits, value_and_u};
 use super::parameters::PRIOR;
 use super::quality::agreement;
@@ -35,8 +35,8 @@ pub const IDENTIFIES: &str = "makes the confounded parameters identifiable";
 pub const IMPROVES: &str = "most lowers the largest uncertainty";
 /// Share of the noise in a variance below which more readings do not help.
 const MIN_NOISE_SHARE: f64 = 0.1;
-/// The session that the trace of an input of a comparison writes, beside the input.
-const TRACED: &str = "traced.toml";
+/// What to correct by differences from a model that lacks an effect.
+const NOTHING_YET: &str = "What to correct: nothing yet; what the model lacks is in every difference";
 /// Digits of a component of a unit vector.
 const DIRECTION_PLACES: usize = 6;
 
@@ -176,7 +176,10 @@ fn measure(statement: &MeasureStatement, machine: Option<&Machine>, commands: &C
         }
         NextStep::Nothing => one("no candidate test is known for this instrument"),
         NextStep::NoneHelps => one("no candidate test makes the confounded parameters identifiable"),
-        NextStep::Refit => one(&format!("nothing before {}, which identifies the machine anew", command("trace", ""))),
+        NextStep::Refit => {
+            let saved = command("trace", &format!("--save {}", commands.beside(TRACED_MODEL)));
+            one(&format!("nothing before {saved}, which identifies the machine anew"))
+        }
         NextStep::WidenRange => one("a session that covers the range of these readings"),
         NextStep::Repeat => one("the session once more"),
         NextStep::NextCheck => one("the next check"),
@@ -257,6 +260,9 @@ pub fn of_validation(
     result: &ValidationResult,
     commands: &Commands,
 ) -> Vec<Sentence> {
+    if let Some(own) = &result.not_judged {
+        return before_validation(own, commands);
+    }
     let outside = &result.outside;
     let moved = statements
         .changed
@@ -291,6 +297,34 @@ pub fn of_validation(
         _ => sentences.extend(measure(&statements.measure, None, commands)),
     }
     sentences
+}
+
+/// What comes before a validation of a model that itself lacks an effect.
+fn before_validation(own: &ModelNotJudged, commands: &Commands) -> Vec<Sentence> {
+    let of_session = commands.for_session(Path::new(&own.session));
+    let (next, command, words) = match own.is_traced {
+        false => (
+            "nothing before a trace of the model's own session, whose model takes its place",
+            of_session.command("trace", &format!("--save {}", of_session.beside(TRACED_MODEL))),
+            "finds the effect behind the model",
+        ),
+        true => (
+            "what separates the effects that the trace of the model's own session left open",
+            of_session.command("trace", ""),
+            "states what the model still lacks",
+        ),
+    };
+    vec![
+        not_judged("the model", own.birge_ratio, &own.why).into(),
+        NOTHING_YET.to_string().into(),
+        format!("What to measure next: {next}").into(),
+        Sentence::Command(command, words.to_string()),
+    ]
+}
+
+/// That no difference from a model that lacks an effect is judged.
+fn not_judged(name: &str, birge_ratio: f64, why: &str) -> String {
+    format!("What has changed: not judged; {name} (χ²/ν = {}): {why}", three_digits(birge_ratio.powi(2)))
 }
 
 /// What has changed, what to correct and to measure after a comparison.
@@ -331,13 +365,9 @@ pub fn of_comparison(
 
 /// What comes before a comparison of inputs of which one lacks an effect.
 fn before_comparison(comparison: &Comparison, commands: &Commands) -> Vec<Sentence> {
-    let mut sentences: Vec<Sentence> = (comparison.not_judged.iter())
-        .map(|own| {
-            let ratio = three_digits(own.birge_ratio.powi(2));
-            format!("What has changed: not judged; {} (χ²/ν = {ratio}): {}", own.input, own.why).into()
-        })
-        .collect();
-    sentences.push("What to correct: nothing yet; what the model lacks is in every difference".to_string().into());
+    let mut sentences: Vec<Sentence> =
+        (comparison.not_judged.iter()).map(|own| not_judged(&own.input, own.birge_ratio, &own.why).into()).collect();
+    sentences.push(NOTHING_YET.to_string().into());
     sentences.push(
         "What to measure next: nothing before a trace, whose session takes the place in the comparison"
             .to_string()

@@ -40,9 +40,10 @@ pub fn report(machine: &str, validation: &Validation, stated: &StatedValidation<
     report.key(residuals(result));
     report.figures(plots::of_machines(result));
     report.section("Moved parameters");
-    match result.moved.is_empty() {
-        true => report.key("No parameter of the machine has moved significantly."),
-        false => report.key(moved(result).folded(MAX_ROWS)),
+    match (&result.not_judged, result.moved.is_empty()) {
+        (Some(_), _) => report.key("Not judged: the model itself lacks an effect."),
+        (None, true) => report.key("No parameter of the machine has moved significantly."),
+        (None, false) => report.key(moved(result).folded(MAX_ROWS)),
     }
     report.section("Effects");
     report.key(without(result).folded(MAX_ROWS));
@@ -81,6 +82,7 @@ fn key_figures(result: &ValidationResult) -> Vec<KeyFigure> {
 /// The verdict in a sentence.
 fn sentence(result: &ValidationResult) -> String {
     let cause = match result.moved.len() {
+        0 if result.not_judged.is_some() => "the readings are not as the model predicts".to_string(),
         0 => "the residual is larger than predicted".to_string(),
         1 => "1 parameter has moved".to_string(),
         count => format!("{} have moved", counted(count, "parameter")),

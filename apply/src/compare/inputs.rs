@@ -11,7 +11,7 @@ use super::{CompareOptions, Named, compare, one_machine};
 use crate::ApplyError;
 use abbe_identify::fit;
 use abbe_identify::model_file::{IdentifiedModel, Provenance};
-use abbe_identify::results::{Goodness, GoodnessVerdict, Outlier};
+use abbe_identify::results::Outlier;
 
 /// An input of a comparison.
 #[derive(Clone)]
@@ -83,10 +83,7 @@ fn models(inputs: Vec<Input>, seed: u64) -> Result<Vec<Prepared>, ApplyError> {
     }
     let model = |input: Input| match input {
         Input::Model(model) => {
-            // A model states only that its residual exceeded the noise.
-            let enlargement = model.quality.u_enlargement;
-            let exceeds = Goodness::default().with_verdict(GoodnessVerdict::Exceeds).forbids_decisions();
-            let not_judged = exceeds.filter(|_| enlargement > 1.0).map(|why| (false, enlargement, why));
+            let not_judged = model.forbids_decisions().map(|why| (false, model.quality.u_enlargement, why));
             Ok(Prepared { model: *model, outliers: Vec::new(), not_judged })
         }
         Input::Session(session) => {

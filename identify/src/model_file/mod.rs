@@ -31,6 +31,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::noise::Noise;
 use crate::parameters::Role;
+use crate::results::{Goodness, GoodnessVerdict};
 use crate::unit::ReadingUnit;
 use crate::unit::Unit;
 pub use document::{InputFile, MotionRange, Provenance};
@@ -121,6 +122,13 @@ impl IdentifiedModel {
     /// Whether the readings determine a parameter, alone or in a combination. The others stay at nominal.
     pub fn is_estimated(&self, parameter: usize) -> bool {
         !self.parameters[parameter].held && self.u(parameter) > 0.0
+    }
+
+    /// Why nothing can be decided from its estimates; `None` if something can. A model states only that its residual exceeded
+    /// the noise.
+    pub fn forbids_decisions(&self) -> Option<&'static str> {
+        let exceeds = Goodness::default().with_verdict(GoodnessVerdict::Exceeds).forbids_decisions();
+        exceeds.filter(|_| self.quality.u_enlargement > 1.0)
     }
 }
 

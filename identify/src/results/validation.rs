@@ -71,8 +71,11 @@ pub struct ValidationResult {
     /// The model without each effect.
     pub without: Vec<WithoutResult>,
     /// Parameters that have changed, the most significant first. Where the residual of all readings is not as predicted,
-    /// from the readings inside the range.
+    /// from the readings inside the range. Empty if `not_judged` is present.
     pub moved: Vec<MovedParameter>,
+    /// Why no parameter is said to have moved: the model itself lacks an effect. Absent if changes are judged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_judged: Option<ModelNotJudged>,
     /// The volumetric error of the model and of the model with what has moved, rms in µm over the range of its axes; empty
     /// if nothing has moved or the axes have no range.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -81,6 +84,19 @@ pub struct ValidationResult {
     pub set_up: Vec<ParameterResult>,
     /// Warnings in words.
     pub warnings: Vec<String>,
+}
+
+/// A model whose own estimates are not to be quoted, so that no change since is judged.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ModelNotJudged {
+    /// The session from which it was identified.
+    pub session: String,
+    /// Whether it is the model of a trace.
+    pub is_traced: bool,
+    /// √(χ²/ν) of its fit.
+    pub birge_ratio: f64,
+    /// Why nothing can be decided from its estimates.
+    pub why: String,
 }
 
 /// Root mean square of the residual.

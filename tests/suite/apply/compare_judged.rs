@@ -92,6 +92,33 @@ fn a_session_whose_drift_is_traced_differs_by_the_drift_alone() {
     assert_eq!((&pair["judged"], &pair["significant"]), (&true.into(), &0.into()), "{screen}");
 }
 
+/// A model of a session that hides a drift validates nothing: what it lacks is in every difference. That of the printed command
+/// does.
+#[test]
+fn a_model_that_lacks_an_effect_says_nothing_of_what_moved() {
+    let folder = tempfile::tempdir().unwrap();
+    let clean = Recipe::new(Kind::Rotary, 11).readings(600);
+    let before = written(folder.path(), "before", &clean, &[]);
+    let after = written(folder.path(), "after", &drifting(&clean), &[]);
+    let [model, traced, json] = ["model.json", "traced-model.json", "v.json"].map(|name| after.with_file_name(name));
+    succeeds(&["fit", text(&after), "--save", text(&model), "--quiet"]);
+    let validated = |model: &Path| -> (Value, String) {
+        let run = abbe(&["validate", text(model), text(&before), "--json", text(&json)]);
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        (serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap(), String::from_utf8(run.stdout).unwrap())
+    };
+    let (found, screen) = validated(&model);
+    assert_eq!((&found["moved"], &found["statements"]["measure"]["step"]), (&serde_json::json!([]), &"trace".into()));
+    assert_eq!(found["not_judged"]["session"], text(&after));
+    assert!(found["not_judged"]["birge_ratio"].as_f64().unwrap() > 1.0 && found["statements"]["changed"].is_null());
+    assert!(screen.contains("What has changed: not judged; the model (") && !screen.contains("moved by"), "{screen}");
+    let command = ["trace", text(&after), "--save", text(&traced)];
+    assert!(screen.contains(&format!("abbe {}", command.join(" "))), "{screen}");
+    succeeds(&command);
+    let (found, screen) = validated(&traced);
+    assert!(found["not_judged"].is_null() && !screen.contains("not judged"), "{screen}");
+}
+
 /// A machine before and after its correction: what changed is not what to correct, and the volumetric error falls.
 #[test]
 fn a_correction_is_a_change_by_which_the_error_falls() {

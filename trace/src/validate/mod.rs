@@ -23,7 +23,7 @@ use abbe_identify::error::IdentifyError;
 use abbe_identify::model_file::{IdentifiedModel, range};
 use abbe_identify::parameters::Role;
 use abbe_identify::results::validation::{
-    InRangeResult, MovedParameter, RmsResult, ValidatedModel, ValidationResult, WithoutResult,
+    InRangeResult, ModelNotJudged, MovedParameter, RmsResult, ValidatedModel, ValidationResult, WithoutResult,
 };
 use abbe_model::component::ErrorName;
 use abbe_model::session::Session;
@@ -145,6 +145,13 @@ pub fn validate_anew(
         better_than_reference: compared.0.noise_ratio < compared.1.noise_ratio,
     };
     warnings.extend(known.noise_warning());
+    // What the model lacks is in every difference.
+    let not_judged = model.forbids_decisions().map(|why| ModelNotJudged {
+        session: model.provenance.session.clone(),
+        is_traced: model.provenance.command == "trace",
+        birge_ratio: model.quality.u_enlargement,
+        why: why.to_string(),
+    });
     let prediction = &all.prediction;
     let result = ValidationResult {
         verdict: verdict(&evidence),
@@ -174,7 +181,8 @@ pub fn validate_anew(
             coverage_95: prediction.coverage_95,
         },
         without,
-        moved: judged.moved.clone(),
+        moved: if not_judged.is_none() { judged.moved.clone() } else { Vec::new() },
+        not_judged,
         volumetric_rms_um: Vec::new(),
         set_up: known.set_up_estimates(&values)?,
         warnings,
