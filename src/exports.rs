@@ -64,6 +64,8 @@ pub struct ExportOptions {
     pub dh: Option<Source>,
     /// Number of places along the axis of a compensation table; [`PLACES`] if it is not stated.
     pub places: Option<usize>,
+    /// Axes with the position at which a control has its zero, mm or degrees: there the entries of compensation tables are 0.
+    pub references: Vec<(String, f64)>,
 }
 
 impl ExportOptions {
@@ -77,6 +79,7 @@ impl ExportOptions {
             convention: Convention::Modified,
             dh: None,
             places: None,
+            references: Vec::new(),
         }
     }
 }
@@ -198,11 +201,12 @@ impl ExportFormat {
     pub fn ignored(&self, options: &ExportOptions) -> Option<(&'static str, Vec<&'static str>)> {
         type Taken = fn(&ExportFormat) -> bool;
         let entries: Taken = ExportFormat::takes_entries;
-        let stated: [(bool, &str, Taken); 6] = [
+        let stated: [(bool, &str, Taken); 7] = [
             (options.patch.is_some(), "patch", |format| format.word == "urdf"),
             (options.dh.is_some(), "dh", |format| format.word == "dh"),
             (options.convention == Convention::Standard, "convention", |format| format.word == "dh"),
             (options.places.is_some(), "places", ExportFormat::is_of_tables),
+            (!options.references.is_empty(), "reference", ExportFormat::is_of_tables),
             (options.entries == EntryChoice::Plain, "entries", entries),
             (!options.travel.is_measured, "travel", entries),
         ];
@@ -222,7 +226,7 @@ impl ExportFormat {
                 of_locations(model, format)
             }
             Form::Control(control) => of_control(model, control, options),
-            Form::Tables(format) => of_tables(model, format, options.places.unwrap_or(PLACES)),
+            Form::Tables(format) => of_tables(model, format, options),
         }
     }
 }
@@ -300,13 +304,14 @@ fn of_locations(model: &IdentifiedModel, format: &TableFormat) -> Result<Exporte
 }
 
 /// The error motions as compensation tables with a number of places along each axis, and their standard uncertainty.
-fn of_tables(model: &IdentifiedModel, format: &TableFormat, places: usize) -> Result<Exported, ApplyError> {
+fn of_tables(model: &IdentifiedModel, format: &TableFormat, options: &ExportOptions) -> Result<Exported, ApplyError> {
+    let places = options.places.unwrap_or(PLACES);
     if !(2..=MAX_POINTS).contains(&places) {
         let found = format!("a number from 2 to {MAX_POINTS} is expected");
         let expected = "the maximum is that of LinuxCNC and Heidenhain";
         return Err(IdentifyError::not_applicable(format!("a table of {places} places"), found, expected).into());
     }
-    let found = compensation::tables(&model.machine, &of_model(model), format, places);
+    let found = compensation::tables(&model.machine, &of_model(model, &options.references)?, format, places);
     if found.files.is_empty() {
         let all = found.left_out.iter().map(|line| format!("\n  {line}")).collect::<String>();
         let holds = "declare error motions as [[effect]], as `abbe trace --write` does, and fit again";

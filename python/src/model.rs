@@ -82,7 +82,7 @@ impl Model {
     }
 
     /// The file of `abbe export`, without a name, or its files; `travel` has axes with their ranges, mm or degrees.
-    #[pyo3(signature = (format, tool_mm, entries, travel, patch=None, tip=None, convention="modified", dh=None, places=None))]
+    #[pyo3(signature = (format, tool_mm, entries, travel, patch=None, tip=None, convention="modified", dh=None, places=None, references=Vec::new()))]
     fn export(
         &self,
         format: &str,
@@ -94,6 +94,7 @@ impl Model {
         convention: &str,
         dh: Option<PathBuf>,
         places: Option<usize>,
+        references: Vec<(String, f64)>,
     ) -> Result<Vec<(Option<String>, Vec<u8>)>, Failed> {
         let format = exports::format(format)?;
         let measured = Travel::measured(&self.model);
@@ -108,6 +109,7 @@ impl Model {
                 .map(|file| files::foreign_text(&file, "the URDF file").map(|source| (source, tip)))
                 .transpose()?,
             places,
+            references,
             travel: travel.iter().try_fold(measured, |all, (axis, range)| all.with(&self.model, axis, *range))?,
         };
         if let Some((option, owners)) = format.ignored(&options) {

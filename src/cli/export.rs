@@ -84,6 +84,11 @@ pub struct ExportArguments {
     /// Example: --as heidenhain-tables --places 73
     #[arg(long, value_name = "N")]
     places: Option<usize>,
+    /// Position of an axis, mm or degrees, at which the entries of a table are 0 [default: 0; outside the table its first entry].
+    ///
+    /// Example: --as linuxcnc-tables --reference X=-400
+    #[arg(long, value_name = "AXIS=POSITION", allow_hyphen_values = true)]
+    reference: Vec<String>,
     #[command(flatten)]
     output: OutputArguments,
 }
@@ -91,8 +96,7 @@ pub struct ExportArguments {
 /// Runs `abbe export`.
 pub fn run(arguments: &ExportArguments, _: Global) -> Result<(), Failure> {
     let format = exports::format(&arguments.format)?;
-    let file = Some(&arguments.out).filter(|_| !format.is_of_tables());
-    let outputs = arguments.output.prepared(&[file])?;
+    let outputs = arguments.output.prepared(&[Some(&arguments.out).filter(|_| !format.is_of_tables())])?;
     outputs.refuse_overwrite([arguments.model.as_path()])?;
     let source = files::text(&arguments.model, "the model file")?;
     let model = model_file::of_source(&source)?;

@@ -13,6 +13,8 @@ use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::driver::{DriverPart, DriverSample};
 use abbe_model::effect::{Component, Effect};
 
+use crate::ApplyError;
+use abbe_identify::IdentifyError;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::model_file::motion::over_own_axis;
 use abbe_identify::parameters::Role;
@@ -26,8 +28,9 @@ pub struct ErrorCurve {
     pub axis: usize,
     /// The positions through which the axis moved while readings observed the error, mm or rad.
     pub range: Range<f64>,
-    /// The position at which the error counts as zero: the first one of the range, if the range does not contain the zero
-    /// of the axis. There the model is an extrapolation, and its error no measured one.
+    /// The position at which the error counts as zero: the stated reference position of the axis, else the first one of the
+    /// range, if the range does not contain the zero of the axis. There the model is an extrapolation, and its error no
+    /// measured one.
     pub zero: Option<f64>,
     terms: Vec<(Effect, Vec<f64>)>,
     /// The indices of the terms' coefficients and estimated numbers among the model's parameters, term by term.
@@ -130,8 +133,12 @@ pub struct Compensation {
     pub left_out: Vec<String>,
 }
 
-/// The curves and location errors of a model.
-pub fn of_model(model: &IdentifiedModel) -> Compensation {
+/// The curves and location errors of a model. `references` are the positions of axes at which a control has its zero, mm or
+/// degrees: the errors of such an axis are those less the error there.
+///
+/// # Errors
+/// If a reference position is of no axis with a curve, or outside the range of one of its curves.
+pub fn of_model(model: &IdentifiedModel, references: &[(String, f64)]) -> Result<Compensation, ApplyError> {
     let mut result = Compensation::default();
     let machine = &model.machine;
     let list = &model.parameters;
@@ -193,8 +200,15 @@ pub fn of_model(model: &IdentifiedModel) -> Compensation {
                 kind.unit()
             ));
         }
-        let zero = (!(range[0]..=range[1]).contains(&0.0)).then_some(range[0]);
-        if let Some(zero) = zero.map(|zero| kind.to_display(zero)) {
+        let stated = references.iter().find(|(name, _)| *name == error.axis).map(|(_, place)| *place);
+        let within = [range[0], range[1]].map(|end| kind.to_display(end));
+        if let Some(found) = stated.filter(|place| !(within[0]..=within[1]).contains(place)) {
+            let name = format!("the reference position of {} in the table of {error}", error.axis);
+            return Err(IdentifyError::OutOfRange { name, found, range: within, unit: kind.unit() }.into());
+        }
+        let stated = stated.map(|place| kind.to_internal(place));
+        let zero = stated.or((!(range[0]..=range[1]).contains(&0.0)).then_some(range[0]));
+        if let Some(zero) = zero.filter(|_| stated.is_none()).map(|zero| kind.to_display(zero)) {
             result.left_out.push(format!(
                 "{error} at {zero:.3} {}: the zero of the table; at 0 the error is not measured",
                 kind.unit()
@@ -210,9 +224,17 @@ pub fn of_model(model: &IdentifiedModel) -> Compensation {
             covariance: Vec::new(),
         });
     }
+    for (name, _) in references {
+        machine.axis_index(name).ok_or_else(|| IdentifyError::no_axis(machine, "", name))?;
+        if !result.curves.iter().any(|curve| curve.error.axis == *name) {
+            let found = "no table of the model is over it";
+            let expected = "state the reference position of an axis whose error motions are written";
+            return Err(IdentifyError::not_applicable(format!("axis `{name}`"), found, expected).into());
+        }
+    }
     for curve in &mut result.curves {
         let row = |j: &usize| curve.unknowns.iter().map(|k| model.covariance[(*j, *k)]).collect();
         curve.covariance = curve.unknowns.iter().map(row).collect();
     }
-    result
+    Ok(result)
 }

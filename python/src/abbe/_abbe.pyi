@@ -168,6 +168,7 @@ class Model:
         convention: str = "modified",
         dh: _Path | None = None,
         places: int | None = None,
+        references: Sequence[tuple[str, float]] = ...,
     ) -> list[tuple[str | None, bytes]]: ...
     def correct(
         self,

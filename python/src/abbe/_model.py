@@ -134,6 +134,7 @@ class Model:
         convention: str = "modified",
         dh: str | os.PathLike[str] | None = None,
         places: int | None = None,
+        reference: Mapping[str, float] | None = None,
     ) -> str | dict[str, str]:
         """Return the calibrated machine for other programs and for controls, as ``abbe export``.
 
@@ -163,9 +164,12 @@ class Model:
             With ``"dh"``: the maker's table (CSV), near whose frames the calibrated ones lie.
         places : int, optional
             With tables: the number of places along the axis; 37 by default.
+        reference : mapping of axis to float, optional
+            With tables: the position of an axis at which the control has its zero, mm or degrees. There the entries are 0.
         """
         ranges = [(axis, (float(low), float(high))) for axis, (low, high) in (travel or {}).items()]
-        found = self._handle.export(format, tool_mm, entries, ranges, patch, tip, convention, dh, places)
+        zeros = [(axis, float(position)) for axis, position in (reference or {}).items()]
+        found = self._handle.export(format, tool_mm, entries, ranges, patch, tip, convention, dh, places, zeros)
         files = {name: text.decode() for name, text in found if name is not None}
         if not files:
             text = found[0][1].decode()

@@ -23,6 +23,7 @@ impl ExportArguments {
             entries: exports::entries(&self.entries)?,
             travel: travel(&self.travel, model)?,
             places: self.places,
+            references: self.reference.iter().map(|option| reference(option)).collect::<Result<_, _>>()?,
         })
     }
 }
@@ -44,4 +45,15 @@ fn travel(options: &[String], model: &IdentifiedModel) -> Result<Travel, Failure
         values::POSITION.all(&format!("--travel {}=", cut(name.trim(), 80)), &[from, to])?;
         travel.with(model, name.trim(), [from, to]).map_err(|error| refused(error.to_string()))
     })
+}
+
+/// The axis and the position of an option `AXIS=POSITION`.
+fn reference(option: &str) -> Result<(String, f64), Failure> {
+    let place = option.split_once('=').and_then(|(name, place)| Some((name.trim(), place.trim().parse().ok()?)));
+    let (name, place) = place.ok_or_else(|| {
+        let found = cut(option, 80);
+        Failure::CommandLine(format!("`--reference {found}`: AXIS=POSITION is expected, as X=-400, in mm or degrees"))
+    })?;
+    values::POSITION.check(&format!("--reference {}=", cut(name, 80)), place)?;
+    Ok((name.to_string(), place))
 }

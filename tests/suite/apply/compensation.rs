@@ -328,12 +328,14 @@ fn columns_and_rows_of_commands_are_read_or_named() {
     );
 }
 
+/// The error of [`laser_from_100`], µm at mm.
+fn error_um(x: f64) -> f64 {
+    7.0 + 0.03 * x + 1e-4 * x * x
+}
+
 /// A laser measures X from 100 to 500 mm: the zero of the axis is not among the positions, and the error at it an
-/// extrapolation. The table is zero at its first entry, with a small uncertainty.
-#[test]
-fn a_table_away_from_the_zero_of_its_axis_begins_with_zero() {
-    let folder = tempfile::tempdir().unwrap();
-    let error_um = |x: f64| 7.0 + 0.03 * x + 1e-4 * x * x;
+/// extrapolation.
+fn laser_from_100(folder: &Path) -> std::path::PathBuf {
     let mut rows = "run,x_mm,deviation_um\n".to_string();
     for run in 0..2 {
         for k in 0..=16 {
@@ -342,13 +344,21 @@ fn a_table_away_from_the_zero_of_its_axis_begins_with_zero() {
             rows.push_str(&format!("{},{x},{:.4}\n", run + 1, error_um(x) + noise));
         }
     }
-    std::fs::write(folder.path().join("x.csv"), rows).unwrap();
-    let session = folder.path().join("session.toml");
+    std::fs::write(folder.join("x.csv"), rows).unwrap();
+    let session = folder.join("session.toml");
     let text_of = "[machine]\nchain = \"w b X Y Z t\"\naxis.X = {}\naxis.Y = {}\naxis.Z = {}\n\
         [instrument]\nkind = \"laser\"\nnoise_um = 0.05\n[unknowns]\nerrors = []\n\
         [[effect]]\ncomponent = \"EXX\"\nshape = \"polynomial\"\norder = 2\n\
         [[test]]\nname = \"LX\"\ndata = \"x.csv\"\nreflector_mm = [0, 0, 0]\nbeam = [1, 0, 0]\n";
     std::fs::write(&session, text_of).unwrap();
+    session
+}
+
+/// The table is zero at its first entry, with a small uncertainty.
+#[test]
+fn a_table_away_from_the_zero_of_its_axis_begins_with_zero() {
+    let folder = tempfile::tempdir().unwrap();
+    let session = laser_from_100(folder.path());
     let out = folder.path().join("tables");
     let run = exported(&session, &["--as", "linuxcnc-tables", "--out", text(&out), "--places", "17"]);
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
@@ -361,5 +371,54 @@ fn a_table_away_from_the_zero_of_its_axis_begins_with_zero() {
         let expected_mm = 1e-3 * (error_um(row[0]) - error_um(100.0));
         assert!((row[1] - row[0] - expected_mm).abs() < 1e-4, "{row:?}: {expected_mm}");
         assert!(row[3] < 1e-4, "{row:?}");
+    }
+}
+
+/// The control has its zero at X = 300 mm: there the entries of every format and their uncertainty are zero, and elsewhere they are
+/// the error less that at 300 mm.
+#[test]
+fn a_table_has_its_zero_at_the_reference_position() {
+    let folder = tempfile::tempdir().unwrap();
+    let session = laser_from_100(folder.path());
+    for (control, file) in [("linuxcnc", "X.comp"), ("heidenhain", "X.COM"), ("beckhoff", "volcomp.csv")] {
+        let out = folder.path().join(control);
+        let format = format!("{control}-tables");
+        let options = ["--as", &format, "--out", text(&out), "--places", "17", "--reference", "X=300"];
+        let run = exported(&session, &options);
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        let printed = String::from_utf8(run.stdout).unwrap();
+        assert!(!printed.contains("the zero of the table"), "{printed}");
+        let table = std::fs::read_to_string(out.join(file)).unwrap();
+        let lines = table.lines().filter(|line| !line.starts_with("//")).map(|line| line.replace("# u", ""));
+        let numeric = lines.filter_map(|line| line.split_whitespace().map(|cell| cell.parse().ok()).collect());
+        let rows: Vec<Vec<f64>> = numeric.filter(|row: &Vec<f64>| !row.is_empty()).collect();
+        assert_eq!(rows.len(), 17, "{table}");
+        for row in &rows {
+            let entry_mm = if control == "linuxcnc" { row[1] - row[0] } else { row[1] };
+            let expected_mm = 1e-3 * (error_um(row[0]) - error_um(300.0));
+            assert!((entry_mm - expected_mm).abs() < 1e-4, "{control}: {row:?}, {expected_mm}");
+            assert!(row[0] != 300.0 || entry_mm.abs() < 1e-12, "{control}: {row:?}");
+        }
+        // error,position,position_unit,direction,value,u,unit
+        let uncertainty = std::fs::read_to_string(out.join("uncertainty.csv")).unwrap();
+        let rows: Vec<Vec<&str>> = uncertainty.lines().skip(1).map(|line| line.split(',').collect()).collect();
+        for row in &rows {
+            let [position, u] = [row[1], row[5]].map(|cell| cell.parse::<f64>().unwrap());
+            assert_eq!(u == 0.0, position == 300.0, "{row:?}");
+        }
+        assert_eq!(rows.len(), 17, "{uncertainty}");
+    }
+    let out = folder.path().join("none");
+    for (format, reference, code, expected) in [
+        ("linuxcnc-tables", "X=600", 1, "the reference position of X in the table of EXX"),
+        ("linuxcnc-tables", "Y=0", 1, "axis `Y`: no table of the model is over it"),
+        ("linuxcnc-tables", "W=0", 1, "no axis `W`"),
+        ("linuxcnc-tables", "X", 2, "AXIS=POSITION is expected"),
+        ("table", "X=300", 2, "`--reference` belongs to `--as linuxcnc-tables`"),
+    ] {
+        let run = exported(&session, &["--as", format, "--out", text(&out), "--reference", reference]);
+        let said = String::from_utf8_lossy(&run.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(run.status.code(), Some(code), "{said}");
+        assert!(said.contains(expected) && !out.exists(), "{said}");
     }
 }
