@@ -53,6 +53,9 @@ pub struct Remaining {
     pub plain: Size,
     /// With the entries that are written.
     pub written: Size,
+    /// Whether base and target are presumed to be set up anew, as in the model: a shift and a rotation of the base and an
+    /// offset of the target are no errors. Otherwise only the zero of the workpiece is.
+    pub set_up_anew: bool,
 }
 
 impl Remaining {
@@ -60,9 +63,18 @@ impl Remaining {
     pub fn words(&self) -> String {
         let [without, plain, written] =
             [self.without, self.plain, self.written].map(|size| format!("{:.1}", size.rms_um));
+        let presumed = match self.set_up_anew {
+            true => {
+                "base and target are presumed to be set up anew (a shift and a rotation of the base and an offset of the \
+                     target count as no error)"
+            }
+            false => {
+                "the zero of the workpiece is presumed to be measured on the table (a constant shift counts as no error)"
+            }
+        };
         format!(
             "the model is {without} um rms over the range of its readings; the plain location errors leave {plain}, those \
-             written, which leave least without the effects, {written}, the whole model with its effects 0"
+             written, which leave least without the effects, {written}, the whole model with its effects 0; {presumed}"
         )
     }
 }
@@ -115,7 +127,8 @@ pub fn best_locations(model: &IdentifiedModel, tool_mm: [f64; 3]) -> Result<(Vec
     let (free, none) = (vec![true; slots.len()], vec![0.0; slots.len()]);
     let plain: Vec<f64> = slots.iter().map(|slot| errors[*slot]).collect();
     let mut lines = Lines::of(model, slots.clone(), &Travel::measured(model), tool_mm)?;
-    if model.parameters.iter().any(|own| own.role == Role::Setup && own.prior == Prior::Free) {
+    let set_up_anew = model.parameters.iter().any(|own| own.role == Role::Setup && own.prior == Prior::Free);
+    if set_up_anew {
         lines = lines.with_free_set_up();
     }
     let best = lines.best(&plain, &free);
@@ -126,7 +139,7 @@ pub fn best_locations(model: &IdentifiedModel, tool_mm: [f64; 3]) -> Result<(Vec
         slots.iter().zip(best).for_each(|(slot, value)| errors[*slot] = value);
     }
     let written = if is_better { written } else { of_plain };
-    Ok((errors, Some(Remaining { without, plain: of_plain, written })))
+    Ok((errors, Some(Remaining { without, plain: of_plain, written, set_up_anew })))
 }
 
 impl<'m> Lines<'m> {

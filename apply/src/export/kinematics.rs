@@ -183,6 +183,7 @@ pub fn table(
         without: lines.remaining(&[0.0; LINES.len()]),
         plain: lines.remaining(&plain),
         written: lines.remaining(&written),
+        set_up_anew: false,
     };
     let mut parameters = Vec::new();
     let mut left_out: Vec<String> = Vec::new();

@@ -354,7 +354,9 @@ fn a_fixed_geometry_states_what_the_effects_leave() {
         assert!(said.contains("left out: EYA~A:h2"), "{said}");
         assert!(said.contains(&format!("{:.1} um rms over the range of its readings", rms("without"))), "{said}");
         assert!(said.contains("which leave least without the effects"), "{said}");
+        assert!(said.contains("the zero of the workpiece is presumed to be measured on the table"), "{said}");
     }
+    assert_eq!(result["remaining"]["set_up_anew"], false);
 }
 
 /// The summary of corrected commands covers every row, those too that could not be corrected, and states its tool point.

@@ -278,6 +278,10 @@ fn parameters_without_an_effect_leave_least() {
         assert!((stated / expected - 1.0).abs() < 0.05, "{key}: {stated} µm, {expected} µm expected");
         assert!([&screen, &file].iter().all(|said| said.contains(&format!(" {stated:.1}"))), "{key}: {screen}\n{file}");
     }
+    // The figures presume what the numbers above take off: a base and a target that are set up anew.
+    let presumed = "base and target are presumed to be set up anew";
+    assert!(screen.contains(presumed) && file.contains(presumed), "{screen}\n{file}");
+    assert_eq!(found["remaining"]["set_up_anew"], true);
     assert!(screen.contains("left out: EBJ2~J2:h2") && plain_fit["remaining"].is_null(), "{screen}");
 }
 
