@@ -20,6 +20,10 @@ pub(super) struct Trial {
     /// χ² of the readings over their degrees of freedom, at least 1: the variance of the noise over the variance that
     /// is assumed.
     pub excess: f64,
+    /// χ² of the readings over their degrees of freedom.
+    pub ratio: f64,
+    /// Number of scalar readings.
+    pub readings: usize,
     /// Residual over scalar readings, mm.
     pub rms_mm: f64,
     /// Complexity penalty: twice the logarithm of the ratio of prior volume to posterior volume.
@@ -52,9 +56,12 @@ pub(super) fn trial(session: &Session, noise: &Noise) -> Option<Trial> {
     let readings = problem.scalars();
     let free = list.iter().filter(|parameter| parameter.prior == Prior::Free).count();
     let freedom = readings.saturating_sub(free.min(found.rank.identifiable_basis.ncols())).max(1) as f64;
+    let ratio = (chi_square - of_priors) / freedom;
     chi_square.is_finite().then(|| Trial {
         chi_square,
-        excess: ((chi_square - of_priors) / freedom).max(1.0),
+        excess: ratio.max(1.0),
+        ratio,
+        readings,
         rms_mm: rms_mm(&problem, &problem.residuals(&found.beta)),
         cost: determined + priors,
     })

@@ -25,6 +25,8 @@ const MAX_EXCESS: f64 = 1.2;
 const TIED: f64 = 100.0;
 /// Least factor by which a mistake that is suggested from the residual alone lowers χ².
 const LOWERED: f64 = 4.0;
+/// Least χ²/ν of readings in another unit. Readings that are scaled down leave less than any noise, whatever is wrong with them.
+const LEAST_OF_UNIT: f64 = 0.5;
 
 /// The mistakes that remove the conflicts of a session whose instrument reads between table and tool, the most probable
 /// first. Without conflicts only those that need no further parameter and explain most of the residual.
@@ -38,12 +40,19 @@ pub(super) fn suggestions(problem: &Problem, conflicts: &[Conflict], allowed: f6
     let stated = thinned(problem, MAX_READINGS);
     let mut list = hypotheses::of_two_sides(&stated);
     let many = list.iter().filter(|one| !needs_no_parameter(one.kind)).count() > MAX_HYPOTHESES;
+    // The noise of repeats is in the unit of the readings, and does not tell which it is.
+    let is_stated = problem.noise.source == NoiseSource::Stated;
+    list.retain(|one| is_stated || one.factor == 1.0);
     list.retain(|one| {
         needs_no_parameter(one.kind) || !(by_residual || many && !is_contradicted(one, problem, conflicts))
     });
     let (mut base, mut tried) = trials(&stated, list, sigma_mm);
     if by_residual {
-        tried.retain(|(_, found)| found.chi_square * LOWERED < base.chi_square);
+        // Readings that are scaled leave a residual that is scaled with them.
+        let lowers = |factor: f64, found: &Trial| found.rms_mm.powi(2) * LOWERED < (factor * base.rms_mm).powi(2);
+        tried.retain(|(one, found)| {
+            found.chi_square * LOWERED < base.chi_square && (one.factor == 1.0 || lowers(one.factor, found))
+        });
     }
     // The residual of the best fit is noise that no mistake explains. The priors keep their weight.
     let excess = (tried.iter()).map(|(_, found)| found.excess).fold(base.excess, f64::min);
@@ -70,17 +79,24 @@ pub(super) fn suggestions(problem: &Problem, conflicts: &[Conflict], allowed: f6
     listed.into_iter().map(|(_, suggestion)| suggestion).collect()
 }
 
-/// Fits the session as it is stated, and with each mistake that can be fitted.
+/// Fits the session as it is stated, and with each mistake that can be fitted. Readings `z = f·y` in another unit have the density
+/// `p(z)·f` for each reading, so that `−2·N·ln f` is added to their χ².
 fn trials(stated: &Session, list: Vec<Hypothesis>, sigma_mm: f64) -> (Trial, Vec<(Hypothesis, Trial)>) {
     let noise = Noise::white(sigma_mm, NoiseSource::Stated);
     // If the session as stated cannot be fitted, every mistake that can be fitted is better.
     let base = trial(stated, &noise).unwrap_or(Trial {
         chi_square: f64::INFINITY,
         excess: f64::INFINITY,
+        ratio: f64::INFINITY,
+        readings: 0,
         rms_mm: f64::INFINITY,
         cost: 0.0,
     });
-    let found = parallel::map(list.len(), &|k| trial(&list[k].session, &noise));
+    let found = parallel::map(list.len(), &|k| {
+        let (factor, found) = (list[k].factor, trial(&list[k].session, &noise)?);
+        let chi_square = found.chi_square - 2.0 * found.readings as f64 * factor.ln();
+        (factor == 1.0 || found.ratio >= LEAST_OF_UNIT).then_some(Trial { chi_square, ..found })
+    });
     (base, list.into_iter().zip(found).filter_map(|(hypothesis, found)| Some((hypothesis, found?))).collect())
 }
 

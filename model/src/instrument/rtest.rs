@@ -22,7 +22,7 @@ use super::column::{Column, Quantity};
 use super::check::MAX_MM;
 use super::set_up::{self, SetUp, Written};
 use super::{Contact, 
-    Checked, Entry, Fault, Following, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy,
+    Checked, Entry, Fault, Following, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Misreading, Reading, SharedBy,
     Station, default_errors, displaced, point,
 };
 use crate::median::median;
@@ -63,6 +63,22 @@ const SENSOR_CHANNELS: [Channel; 3] = Channel::vector(["du", "dv", "dw"]);
 /// The columns of a vector in the frame that carries the sensors, and those of the single sensors.
 const VECTOR: [Column; 3] = Column::vector(["dx", "dy", "dz"], "um");
 const SENSORS: [Column; 3] = Column::vector(["du", "dv", "dw"], "um");
+
+/// The columns of two directions, or of two sensors, are exchanged.
+const VECTOR_EXCHANGED: [Misreading; 3] = [
+    exchanged::<0, 1>("dx, dy", "the columns dx and dy are exchanged"),
+    exchanged::<0, 2>("dx, dz", "the columns dx and dz are exchanged"),
+    exchanged::<1, 2>("dy, dz", "the columns dy and dz are exchanged"),
+];
+const SENSORS_EXCHANGED: [Misreading; 3] = [
+    exchanged::<0, 1>("du, dv", "the columns du and dv are exchanged"),
+    exchanged::<0, 2>("du, dw", "the columns du and dw are exchanged"),
+    exchanged::<1, 2>("dv, dw", "the columns dv and dw are exchanged"),
+];
+
+const fn exchanged<const A: usize, const B: usize>(columns: &'static str, words: &'static str) -> Misreading {
+    Misreading { columns, words, reread: |values| values.swap(A, B) }
+}
 
 /// Least triple product of three measuring directions. Below it, one coordinate has twenty times the noise.
 const MIN_VOLUME: f64 = 0.05;
@@ -365,6 +381,9 @@ impl Instrument for RTest<f64> {
     fn missing(&self, has: &dyn Fn(Quantity) -> bool) -> Option<Fault> {
         let column = self.columns().iter().find(|column| !has(column.quantity))?;
         Some((format!("`{}`", column.name(column.unit)), self.columns_help().into()))
+    }
+    fn misreadings(&self) -> &'static [Misreading] {
+        if self.sensors.is_some() { &SENSORS_EXCHANGED } else { &VECTOR_EXCHANGED }
     }
     fn help_on_column(&self, stem: &str) -> Option<&'static str> {
         let other = if self.sensors.is_some() { &VECTOR } else { &SENSORS };

@@ -143,6 +143,54 @@ fn exchanged_columns_and_inches_are_named() {
     }
 }
 
+/// The session of the bundled R-test with a change of the header and of each reading in mm.
+fn of_r_test(header: impl Fn(&str) -> String, reading: impl Fn(f64) -> f64) -> Session {
+    let folder = tempfile::tempdir().unwrap();
+    for entry in std::fs::read_dir(ready("r-test/measured")).unwrap() {
+        let path = entry.unwrap().path();
+        let mut text = std::fs::read_to_string(&path).unwrap();
+        if path.extension().is_some_and(|extension| extension == "csv") {
+            let (names, rows) = text.split_once('\n').unwrap();
+            let is_reading: Vec<bool> = names.split(',').map(|name| name.starts_with('d')).collect();
+            let row = |line: &str| {
+                let cells = line.split(',').zip(&is_reading).map(|(cell, is_reading)| match is_reading {
+                    true => format!("{:.9}", reading(cell.parse().unwrap())),
+                    false => cell.to_string(),
+                });
+                cells.collect::<Vec<_>>().join(",") + "\n"
+            };
+            text = header(names) + "\n" + &rows.lines().map(row).collect::<String>();
+        }
+        std::fs::write(folder.path().join(path.file_name().unwrap()), text).unwrap();
+    }
+    files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap()
+}
+
+/// Two columns of the readings of an R-test are exchanged, or its readings are in inches: each is what is suggested. As they are,
+/// nothing is.
+#[test]
+fn exchanged_readings_and_readings_in_inches_are_named() {
+    let same = |value: f64| value;
+    let found = plausibility(&of_r_test(str::to_string, same));
+    assert!(found.suggestions.is_empty(), "{found:#?}");
+    for (one, other) in [("dx_mm", "dy_mm"), ("dx_mm", "dz_mm"), ("dy_mm", "dz_mm")] {
+        let exchanged = |names: &str| names.replace(one, "?").replace(other, one).replace('?', other);
+        let found = plausibility(&of_r_test(exchanged, same));
+        let words = format!("the columns {} and {} are exchanged", &one[..2], &other[..2]);
+        let first = &found.suggestions[0];
+        assert_eq!((first.kind, &first.words), (SuggestionKind::ColumnsExchanged, &words), "{found:#?}");
+    }
+    // Millionths of an inch under µm.
+    let in_um = |names: &str| {
+        ["dx", "dy", "dz"]
+            .iter()
+            .fold(names.to_string(), |names, axis| names.replace(&format!("{axis}_mm"), &format!("{axis}_um")))
+    };
+    let found = plausibility(&of_r_test(in_um, |mm| mm / 25.4e-6));
+    let first = &found.suggestions[0];
+    assert_eq!(first.words, "the readings are in millionths of an inch, not in µm", "{found:#?}");
+}
+
 /// A table whose linear axes are in inches under names in mm.
 fn in_inches(table: &str) -> String {
     let (header, rows) = table.split_once('\n').unwrap();

@@ -16,12 +16,14 @@ pub(super) struct Hypothesis {
     pub subject: String,
     pub words: String,
     pub session: Session,
+    /// The factor by which the readings of the changed session are larger.
+    pub factor: f64,
 }
 
 impl Hypothesis {
     pub fn new(kind: SuggestionKind, subject: &str, words: String, session: Session) -> Hypothesis {
         let subject = subject.to_string();
-        Hypothesis { kind, subject, words, session }
+        Hypothesis { kind, subject, words, session, factor: 1.0 }
     }
 }
 
@@ -35,6 +37,7 @@ pub(super) fn of_two_sides(session: &Session) -> Vec<Hypothesis> {
     let mut list = axes(session);
     list.extend(set_ups::balls(session));
     list.extend(set_ups::readings(session));
+    list.extend(set_ups::columns(session));
     list.extend(set_ups::things(session));
     list.extend(set_ups::moves(session));
     list

@@ -132,6 +132,41 @@ pub(super) fn readings(session: &Session) -> Vec<Hypothesis> {
     list
 }
 
+/// Lengths in inches: the factor by which they are off, and what their column then holds.
+const INCHES: [(f64, &str); 2] = [
+    (25.4, "in inches, not in mm, or in thousandths of an inch, not in µm"),
+    (0.0254, "in millionths of an inch, not in µm"),
+];
+
+/// Columns of readings that are exchanged, and readings in inches.
+pub(super) fn columns(session: &Session) -> Vec<Hypothesis> {
+    let mut list: Vec<Hypothesis> = Vec::new();
+    for misreading in measured(session).flat_map(|test| test.station.misreadings()) {
+        if list.iter().any(|known| known.words == misreading.words) {
+            continue;
+        }
+        let changed = with_readings(session, |test, _, observed| {
+            if test.station.misreadings().iter().any(|own| own.words == misreading.words) {
+                observed.chunks_exact_mut(test.station.channels().len()).for_each(misreading.reread);
+            }
+        });
+        let words = misreading.words.to_string();
+        list.push(Hypothesis::new(SuggestionKind::ColumnsExchanged, misreading.columns, words, changed));
+    }
+    if session.units().angles {
+        return list;
+    }
+    list.extend(INCHES.map(|(factor, unit)| {
+        let scaled = with_readings(session, |test, _, observed| {
+            let from_mm = test.station.reference_mm();
+            observed.iter_mut().for_each(|value| *value = from_mm + factor * (*value - from_mm));
+        });
+        let words = format!("the readings are {unit}");
+        Hypothesis { factor, ..Hypothesis::new(SuggestionKind::ColumnUnit, "readings", words, scaled) }
+    }));
+    list
+}
+
 /// A mounted thing: its name, and what tests share its mount.
 type Thing = (&'static str, SharedBy);
 
