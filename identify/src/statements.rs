@@ -17,9 +17,10 @@ use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
 use abbe_model::instrument::Contact;
 
+use crate::fit::doubt_on_unit;
 use crate::linear::is_of_interest;
 use crate::parameters::Role;
-use crate::plausibility::Plausibility;
+use crate::plausibility::{Conflict, ConflictKind, Plausibility, likely_unit};
 use crate::problem::Problem;
 use crate::results::validation::{MovedParameter, ValidationResult, ValidationVerdict};
 use crate::results::{
@@ -48,7 +49,11 @@ impl Statements {
             None => NextStep::Identify,
         };
         let measure = MeasureStatement {
-            description: (measure == NextStep::AllDetermined).then(|| format!("rank {0} of {0}", model.rank)),
+            description: match measure {
+                NextStep::AllDetermined => Some(format!("rank {0} of {0}", model.rank)),
+                NextStep::CheckUnit => in_doubt(problem, &result.plausibility),
+                _ => None,
+            },
             ..measure.into()
         };
         Statements::of_model(problem, model, good(model, result.conformity.as_ref()), measure)
@@ -74,7 +79,9 @@ impl Statements {
                     Some(NextStep::Trace) | None => NextStep::Identify,
                     Some(step) => step,
                 };
-                step.into()
+                let is_unit = step == NextStep::CheckUnit;
+                let description = in_doubt(problem, &result.plausibility).filter(|_| is_unit);
+                MeasureStatement { description, ..step.into() }
             }
         };
         let good = GoodStatement { verdict: Some(result.verdict), ..good(model, result.conformity.as_ref()) };
@@ -141,6 +148,7 @@ fn is_exhausted(problem: &Problem, unobservable: &[Unobservable]) -> bool {
 /// The step that has to come before any further test.
 fn base_step(plausibility: &Plausibility, goodness: Goodness) -> Option<NextStep> {
     match goodness.verdict {
+        _ if goodness.not_judged == Some(NotJudged::WrongUnit) => Some(NextStep::CheckUnit),
         _ if !plausibility.conflicts.is_empty() => Some(NextStep::CorrectSession),
         // More readings are what is lacking.
         GoodnessVerdict::NotJudged if goodness.not_judged == Some(NotJudged::NoDegreesOfFreedom) => None,
@@ -148,6 +156,16 @@ fn base_step(plausibility: &Plausibility, goodness: Goodness) -> Option<NextStep
         verdict if verdict.lacks_an_effect() => Some(NextStep::Trace),
         _ => None,
     }
+}
+
+/// The unit in which readings in doubt likely are.
+fn in_doubt(problem: &Problem, plausibility: &Plausibility) -> Option<String> {
+    let unit = plausibility.conflicts.iter().find(|conflict| conflict.kind == ConflictKind::Unit);
+    let likely = |conflict: &Conflict| {
+        let likely = likely_unit(conflict.value / conflict.stated, problem.unit());
+        format!("probably {likely}, or divided before")
+    };
+    unit.map(likely).or_else(|| doubt_on_unit(problem))
 }
 
 fn good(model: &ModelResult, conformity: Option<&Conformity>) -> GoodStatement {

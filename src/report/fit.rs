@@ -117,6 +117,7 @@ fn next(problem: &Problem, result: &FitResult, step: NextStep, commands: &Comman
                 add(commands.command("trace", ""), "or find an effect that explains the contradiction");
             }
         }
+        NextStep::CheckUnit => add("check the unit of the readings".into(), "compare it with the name of their column"),
         NextStep::StateNoise => {
             add(format!("state {} or repeat a run", problem.session.keys_of_noise()), "have χ² judge the model");
         }

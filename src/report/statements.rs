@@ -160,6 +160,10 @@ fn measure(statement: &MeasureStatement, machine: Option<&Machine>, commands: &C
     let one = |what: &str| vec![format!("What to measure next: {what}").into()];
     match statement.step {
         NextStep::CorrectSession => one("nothing before the session is corrected: the readings contradict it"),
+        NextStep::CheckUnit => {
+            let likely = statement.description.as_ref().map_or(String::new(), |likely| format!(": {likely}"));
+            one(&format!("nothing before the unit of the readings is checked{likely}"))
+        }
         NextStep::Trace => one(&format!("nothing before {}", command("trace", ""))),
         NextStep::StateNoise => one("a run once more, or state the noise: only then can the model be judged"),
         NextStep::SeparatingTest => {

@@ -41,7 +41,7 @@ pub use assume::{assume, statements as assumptions};
 pub use covariance::{null_space, of_parameters as covariance_of_parameters};
 pub use cover::contribution as contribution_beside_noise;
 pub use numbers::NumberInterval;
-pub(crate) use outcome::ratio_of_another_unit;
+pub(crate) use outcome::{doubt_on_unit, ratio_of_another_unit};
 pub use positions::StepPosition;
 pub use prepare::{NearMinimum, prepare, prepare_with, refit, with_families_linearised, with_lever};
 pub(crate) use quantities::{Quantity, quantities, values_at};

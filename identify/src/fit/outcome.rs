@@ -30,7 +30,7 @@ pub fn goodness(problem: &Problem, fit: &Fit) -> Goodness {
     let chi_square_ratio = fit.birge_ratio.powi(2);
     let not_judged = if fit.degrees_of_freedom == 0 {
         Some(NotJudged::NoDegreesOfFreedom)
-    } else if ratio_of_another_unit(problem, fit).is_some() || is_unit_in_doubt(problem) {
+    } else if ratio_of_another_unit(problem, fit).is_some() || doubt_on_unit(problem).is_some() {
         Some(NotJudged::WrongUnit)
     } else if !problem.noise.source.judges() {
         Some(NotJudged::NoNoise)
@@ -58,14 +58,13 @@ pub(crate) fn ratio_of_another_unit(problem: &Problem, fit: &Fit) -> Option<f64>
     (ratio < OF_ANOTHER_UNIT && by_chance < BIRGE_SIGNIFICANCE).then_some(ratio)
 }
 
-/// Whether readings without a stated noise have a size that such an instrument does not have, as in another unit. Their repeats
+/// The doubt about readings without a stated noise whose size such an instrument does not have, as in another unit. Their repeats
 /// are in the same unit and show nothing.
-fn is_unit_in_doubt(problem: &Problem) -> bool {
-    let is_doubtful = |test: &Test| {
-        let of_test = |readings| Checked { machine: &problem.session.machine, test: &test.name, readings };
-        test.readings.as_deref().is_some_and(|readings| test.station.doubt(&of_test(readings)).is_some())
-    };
-    problem.session.stated_noise_mm().is_none() && problem.tests.iter().any(is_doubtful)
+pub(crate) fn doubt_on_unit(problem: &Problem) -> Option<String> {
+    let machine = &problem.session.machine;
+    let doubt =
+        |test: &Test| test.station.doubt(&Checked { machine, test: &test.name, readings: test.readings.as_deref()? });
+    problem.tests.iter().find_map(doubt).filter(|_| problem.session.stated_noise_mm().is_none())
 }
 
 /// What determines each parameter of a problem, by index, and the errors that set-up priors determine, in words.

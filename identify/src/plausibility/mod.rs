@@ -33,6 +33,7 @@ use crate::fit::{Fit, ratio_of_another_unit};
 use crate::heldout::{rms_by_unit_mm, rms_mm};
 use crate::noise::NoiseSource;
 use crate::problem::Problem;
+use crate::unit::{ARCSEC, ReadingUnit};
 
 /// Share of the variance of the measured positions that a model of poses explains at least.
 const MIN_EXPLAINED: f64 = 0.99;
@@ -248,6 +249,22 @@ fn residual(problem: &Problem, fit: &Fit) -> Option<Conflict> {
     })
 }
 
+/// Units in which readings are likely, in the form "mm under µm", by the share that the residual is of the stated noise.
+const OF_LENGTHS: [(f64, &str); 2] =
+    [(1e-3, "mm under µm, or m under mm"), (1.0 / 25.4, "inches under mm, or thousandths of an inch under µm")];
+const OF_ANGLES: [(f64, &str); 3] = [
+    (1.0 / 60.0, "arcminutes under arcseconds, degrees under arcminutes, or radians under degrees"),
+    (1.0 / 3600.0, "degrees under arcseconds"),
+    (1.0 / ARCSEC, "radians under arcseconds"),
+];
+
+/// The unit in which readings are likely whose residual is this share of the stated noise.
+pub(crate) fn likely_unit(share: f64, unit: ReadingUnit) -> &'static str {
+    let known: &[(f64, &str)] = if unit.is_micrometre() { &OF_LENGTHS } else { &OF_ANGLES };
+    let away = |factor: f64| (share.max(f64::MIN_POSITIVE) / factor).ln().abs();
+    known.iter().min_by(|a, b| away(a.0).total_cmp(&away(b.0))).map_or("", |(_, words)| words)
+}
+
 /// A residual of less than a tenth of the stated noise.
 fn of_another_unit(problem: &Problem, fit: &Fit) -> Option<Conflict> {
     let ratio = ratio_of_another_unit(problem, fit)?;
@@ -261,10 +278,10 @@ fn of_another_unit(problem: &Problem, fit: &Fit) -> Option<Conflict> {
         pull: None,
         words: format!(
             "the residual is {:.0} times smaller than the stated noise of {}: the readings are probably in another unit than \
-             the name of their column states (mm under µm, degrees under radians), or were divided before; check them, or \
-             `{}`",
+             the name of their column states ({}), or were divided before; check them, or `{}`",
             ratio.max(f64::MIN_POSITIVE).recip().min(LARGEST_FACTOR),
             unit.text(stated_mm * 1e3, 3),
+            likely_unit(ratio, unit),
             unit.noise_key()
         ),
     })

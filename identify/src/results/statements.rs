@@ -71,6 +71,8 @@ impl AxisCorrection {
 pub enum NextStep {
     /// Correct the session: the readings contradict it.
     CorrectSession,
+    /// Check the unit of the readings, which is in doubt.
+    CheckUnit,
     /// Search for the effect that the model lacks.
     Trace,
     /// Measure the test that separates an effect from its aliases.

@@ -33,8 +33,8 @@ fn bar_mm(session: &SimulatedSession, test: &str) -> f64 {
     of_bar.lines().next().unwrap().parse().unwrap()
 }
 
-/// The lengths as deviations in mm, in a column that states µm.
-fn in_mm_under_um(session: &mut SimulatedSession) {
+/// The lengths as deviations in another unit, in a column that states µm.
+fn under_um(session: &mut SimulatedSession, unit_mm: f64) {
     let bars: Vec<Option<f64>> =
         (session.files.iter()).map(|(name, _)| name.strip_suffix(".csv").map(|test| bar_mm(session, test))).collect();
     for ((_, data), bar_mm) in session.files.iter_mut().zip(bars) {
@@ -42,7 +42,7 @@ fn in_mm_under_um(session: &mut SimulatedSession) {
         let lines = data.lines().map(|line| {
             let (rest, last) = line.rsplit_once(',').unwrap();
             match last.parse::<f64>() {
-                Ok(length_mm) => format!("{rest},{:.4}\n", length_mm - bar_mm),
+                Ok(length_mm) => format!("{rest},{:.4}\n", (length_mm - bar_mm) / unit_mm),
                 Err(_) => format!("{rest},deviation_um\n"),
             }
         });
@@ -72,7 +72,7 @@ fn no_certificate(session: &Path, why: &str) {
 fn deviations_in_mm_under_um_pass_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let mut session = drawn(0.3);
-    in_mm_under_um(&mut session);
+    under_um(&mut session, 1.0);
     let file = written(folder.path(), &session);
     for command in ["fit", "trace"] {
         let (found, screen) = result_and_screen(command, &file, &[]);
@@ -84,7 +84,9 @@ fn deviations_in_mm_under_um_pass_nothing() {
             assert_eq!(parameter["quotable"], false, "{parameter}");
         }
         assert_eq!(found["conflicts"][0]["kind"], "unit");
-        assert!(screen.contains("mm under µm"), "{screen}");
+        let advice = "nothing before the unit of the readings is checked: probably mm under µm";
+        assert!(screen.contains(advice) && !screen.contains("or state"), "{screen}");
+        assert_eq!(found["statements"]["measure"]["step"], "check-unit");
     }
     no_certificate(&file, "less than a tenth of the noise");
     // Without a stated noise the size of the readings tells: no ball bar scatters by nanometres.
@@ -93,6 +95,20 @@ fn deviations_in_mm_under_um_pass_nothing() {
         .unwrap();
     let (found, screen) = result_and_screen("fit", &file, &[]);
     nothing_passes(&found, &screen, "wrong-unit");
+    assert_eq!(found["statements"]["measure"]["step"], "check-unit");
+    assert!(screen.contains("is the column in mm, and its name in µm?") && !screen.contains("or state"), "{screen}");
+}
+
+/// Thousandths of an inch leave a 25th of the noise, and are the unit that is named.
+#[test]
+fn deviations_in_thousandths_of_an_inch_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut session = drawn(0.3);
+    under_um(&mut session, 0.0254);
+    let (found, screen) = result_and_screen("fit", &written(folder.path(), &session), &[]);
+    nothing_passes(&found, &screen, "wrong-unit");
+    let unit = "probably inches under mm, or thousandths of an inch under µm";
+    assert!(screen.contains(&format!("the unit of the readings is checked: {unit}")), "{screen}");
 }
 
 /// A noise that is stated three times too large is no other unit: the estimates may be quoted, and nothing is decided. One that
