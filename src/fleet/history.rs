@@ -68,18 +68,10 @@ pub fn statements(machines: &[MachineHistory]) -> HistoryStatements {
             Kind::Shift | Kind::CompensationAndShift => !is_explained,
             Kind::Compensation | Kind::Correction => is_explained,
         };
-        // The last step of this kind: that of the series of the parameter, if no other one follows.
+        // The last step of this kind.
         let shift_of = |one: &ParameterHistory| -> Option<Estimate> {
-            let own = machine.changes.iter().filter(|change| change.parameters.contains(&one.id));
-            let own: Vec<&ChangeEvent> = own.collect();
-            let last = own.iter().rposition(|change| is_wanted(change))?;
-            match last + 1 == own.len() {
-                true => one.steps.last().map(|step| Estimate { value: step.value, u: step.u }),
-                false => {
-                    let change = own[last].changes.iter().find(|change| change.id == one.id)?;
-                    Some(Estimate { value: change.value, u: change.u })
-                }
-            }
+            let is_own = |change: &&ChangeEvent| change.parameters.contains(&one.id) && is_wanted(change);
+            machine.amount(machine.changes.iter().rfind(is_own)?, &one.id)
         };
         let own = machine.parameters.iter().map(|one| ChangedInHistory {
             machine_id: machine.machine_id.clone(),
@@ -372,7 +364,7 @@ fn machine_sessions(machine_id: String, sessions: &[Dated]) -> MachineSessions {
     let machine = sessions.last().and_then(|dated| dated.record.machine.clone());
     let (name, code) = machine.map_or((String::new(), String::new()), |machine| (machine.name, machine.code));
     let determined = last.map_or(0, |record| match &record.base {
-        Some(base) => base.parameters.len(),
+        Some(base) => base.determined(),
         None => record.followed(false).values.iter().filter(|(id, ..)| is_of_machine(id)).count(),
     });
     let validation = last.and_then(|record| record.validation.as_ref()).map(|validation| validation.verdict);

@@ -6,6 +6,7 @@ use abbe_identify::IdentifyError;
 use abbe_identify::fit::Fit;
 use abbe_identify::fit::base::{Gauge, base_parameters};
 use abbe_identify::noise::NoiseSource;
+use abbe_identify::numerics::solve::Svd;
 use abbe_identify::parameter_description::parameter_meaning;
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
@@ -14,6 +15,7 @@ use abbe_identify::results::{
     Covariance, DeterminedBy, EffectName, GoodnessVerdict, ParameterResult, TraceVerdict, Unobservable,
 };
 use abbe_identify::tolerance::Conformity;
+use faer::Mat;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -205,7 +207,21 @@ impl BaseRecord {
             covariance: rows.flat_map(|(row, i)| kept[..=row].iter().map(|j| covariance(*i, *j))).collect(),
         }))
     }
+
+    /// Number of directions of the base parameters that the readings determine: the rank of their covariance. Along the others
+    /// they are held at nominal.
+    pub fn determined(&self) -> usize {
+        let known: Vec<usize> = (0..self.parameters.len()).filter(|own| self.parameters[*own].u > 0.0).collect();
+        let u = |own: usize| self.parameters[known[own]].u;
+        let correlation = Mat::from_fn(known.len(), known.len(), |a, b| {
+            self.covariance.get(in_triangle(known[a], known[b])).copied().unwrap_or(0.0) / (u(a) * u(b))
+        });
+        Svd::of(correlation.as_ref()).map_or(known.len(), |svd| svd.rank(HELD))
+    }
 }
+
+/// Eigenvalue of a correlation, as a share of the largest, below which it is a rounding error.
+const HELD: f64 = 1e-11;
 
 /// Position of an entry in a lower triangle that is stored row by row.
 fn in_triangle(a: usize, b: usize) -> usize {
@@ -339,15 +355,13 @@ impl Record {
     /// not separate all, else the identifiable ones.
     pub fn followed(&self, by_base: bool) -> Followed<'_> {
         match self.base.as_ref().filter(|_| by_base) {
-            Some(base) => Followed {
-                values: base
-                    .parameters
-                    .iter()
-                    .map(|own| (&*own.id, &*own.unit, &*own.meaning, own.value, own.u))
-                    .collect(),
-                places: (0..base.parameters.len()).collect(),
-                covariance: &base.covariance,
-            },
+            Some(base) => {
+                // A parameter without uncertainty is held at nominal in a combination that the readings hardly determine.
+                let known = base.parameters.iter().enumerate().filter(|(_, own)| own.u > 0.0);
+                let (places, values) =
+                    known.map(|(place, own)| (place, (&*own.id, &*own.unit, &*own.meaning, own.value, own.u))).unzip();
+                Followed { values, places, covariance: &base.covariance }
+            }
             None => {
                 let known = self.parameters.iter().enumerate().filter(|(_, own)| own.identifiable);
                 let known: Vec<(usize, &ParameterRecord)> = known.filter(|(_, own)| own.value.is_some()).collect();
@@ -369,5 +383,30 @@ impl Record {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two parameters of which the readings determine the sum, one that they determine, and one that they do not: two directions.
+    #[test]
+    fn directions_held_at_nominal_are_not_determined() {
+        let known = [("a", 1.0), ("b", 1.0), ("c", 0.5), ("d", 0.0)];
+        let parameters = known.map(|(id, u)| BaseParameterRecord {
+            id: id.into(),
+            value: 0.0,
+            u,
+            unit: "um".into(),
+            meaning: String::new(),
+        });
+        let covariance = vec![1.0, 1.0, 1.0, 0.0, 0.0, 0.25, 0.0, 0.0, 0.0, 0.0];
+        let base = BaseRecord { held: Vec::new(), parameters: parameters.to_vec(), covariance };
+        assert_eq!(base.determined(), 2);
+        let record = Record { base: Some(base), ..Record::default() };
+        let followed = record.followed(true);
+        assert_eq!(followed.values.iter().map(|(id, ..)| *id).collect::<Vec<_>>(), ["a", "b", "c"]);
+        assert_eq!((followed.covariance_of(0, 1), followed.covariance_of(2, 2)), (1.0, 0.25));
     }
 }

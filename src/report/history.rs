@@ -245,7 +245,7 @@ fn changes(machines: &[MachineHistory]) -> Table {
                 date(change.before_days),
                 kind(change.kind),
                 Cell::fixed(change.direction_cosine, 2),
-                amounts(change)
+                amounts(machine, change)
             ]
         })
     });
@@ -253,13 +253,14 @@ fn changes(machines: &[MachineHistory]) -> Table {
 }
 
 /// The parameters that have a step, each with its change.
-fn amounts(change: &ChangeEvent) -> String {
+fn amounts(machine: &MachineHistory, change: &ChangeEvent) -> String {
     let found = change.changes.iter().filter(|own| change.parameters.contains(&own.id));
     let amount = |own: &ParameterChange| {
-        let (value, u) = value_and_u(own.value, own.u);
-        format!("{} {}", own.id, quantity(&format!("{value} ± {u}"), &own.unit))
+        let Estimate { value, u } = machine.amount(change, &own.id)?;
+        let (value, u) = value_and_u(value, u);
+        Some(format!("{} {}", own.id, quantity(&format!("{value} ± {u}"), &own.unit)))
     };
-    found.map(amount).collect::<Vec<_>>().join(", ")
+    found.filter_map(amount).collect::<Vec<_>>().join(", ")
 }
 
 /// How much of what the sessions determine is followed, of machines whose parameters are not all separable.

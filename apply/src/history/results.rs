@@ -72,6 +72,18 @@ pub struct MachineHistory {
     pub parameters: Vec<ParameterHistory>,
 }
 
+impl MachineHistory {
+    /// The amount of a change of a parameter whose own series has the step: that of the series if no other step follows, else
+    /// that of the change of all parameters.
+    pub fn amount(&self, change: &ChangeEvent, id: &str) -> Option<Estimate> {
+        let of_series = self.changes.iter().rfind(|one| one.parameters.iter().any(|own| own == id)) == Some(change);
+        let step = self.parameters.iter().find(|one| of_series && one.id == id).and_then(|one| one.steps.last());
+        let of_all = change.changes.iter().find(|own| own.id == id);
+        step.map(|step| Estimate { value: step.value, u: step.u })
+            .or(of_all.map(|own| Estimate { value: own.value, u: own.u }))
+    }
+}
+
 /// A value with its standard uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Estimate {

@@ -175,6 +175,9 @@ fn a_step_of_a_short_series_is_found_and_named() {
     let amount =
         stated.and_then(|line| line.split("EC0Y has shifted by ").nth(1)?.split(" ± ").next()?.parse::<f64>().ok());
     assert!((amount.unwrap_or(f64::NAN).abs() - 20.0).abs() < 1.0, "{screen}");
+    // The table has the same amount.
+    let amount = stated.and_then(|line| line.split("EC0Y has shifted by ").nth(1)).unwrap().trim_end_matches('.');
+    assert!(screen.lines().any(|line| line.contains(&format!("EC0Y {amount}"))), "{screen}");
     for false_beside_a_step in ["No machine is out of control", "no parameter drifts or has shifted"] {
         assert!(!screen.contains(false_beside_a_step), "{screen}");
     }
