@@ -2,7 +2,8 @@
 
 use abbe_identify::IdentifyError;
 use abbe_identify::problem::Problem;
-use abbe_model::session::Session;
+use abbe_model::instrument::InternalUnit;
+use abbe_model::session::{Prior, Session};
 use abbe_model::session::limits::{LARGEST, MIN_UM};
 use abbe_plan::results::PlanAnalysis;
 use abbe_plan::{PlanError, PlanOptions, analyse, collision, prepared, states};
@@ -25,6 +26,27 @@ pub struct PlanningOptions {
     pub planned: bool,
     /// Do not screen undeclared effects.
     pub no_effects: bool,
+    /// Standard uncertainty of every set-up length with a Gaussian prior, µm, instead of the session's.
+    pub setup_um: Option<f64>,
+    /// One mounted spindle ball serves all tests.
+    pub one_spindle_ball: bool,
+}
+
+impl PlanningOptions {
+    /// Gives a session the priors and the mount that the options state.
+    pub fn set_up(&self, session: &mut Session) {
+        for test in &mut session.tests {
+            if self.one_spindle_ball {
+                test.spindle_setup = "all tests".to_string();
+            }
+            let Some(um) = self.setup_um else { continue };
+            for (prior, unknown) in test.priors.iter_mut().zip(test.station.kind().unknowns()) {
+                if matches!(prior, Prior::Gaussian(_)) && unknown.unit == InternalUnit::Millimetre {
+                    *prior = Prior::Gaussian(um * 1e-3);
+                }
+            }
+        }
+    }
 }
 
 /// An analysed plan.
@@ -91,11 +113,19 @@ impl Analysis for Plan {
     type Options = PlanningOptions;
 
     fn run<E: Fault>(given: &[Given<'_>], options: &PlanningOptions, _: u64, _: Listener<'_>) -> Result<Self, E> {
-        let session = session_of::<E>(given)?;
-        if let Some(um) = options.noise_um.filter(|um| !(MIN_UM..=LARGEST).contains(um)) {
-            let message = format!("`noise_um` is {um}; a number of µm from {MIN_UM:e} to {LARGEST:e} is expected");
-            return Err(unusable(message, "the standard deviation of a reading"));
+        let mut session = session_of::<E>(given)?.clone();
+        let lengths = [
+            ("noise_um", options.noise_um, "the standard deviation of a reading"),
+            ("setup_um", options.setup_um, "the standard uncertainty of a set-up length"),
+        ];
+        for (name, um, meaning) in lengths {
+            if let Some(um) = um.filter(|um| !(MIN_UM..=LARGEST).contains(um)) {
+                let message = format!("`{name}` is {um}; a number of µm from {MIN_UM:e} to {LARGEST:e} is expected");
+                return Err(unusable(message, meaning));
+            }
         }
+        options.set_up(&mut session);
+        let session = &session;
         let options = PlanOptions {
             noise_mm: options.noise_um.map(|um| um * 1e-3),
             planned_only: options.planned,

@@ -22,6 +22,9 @@ pub const PROGRAMS: &str = "programs";
 /// The folder of simulated readings.
 pub const SIMULATED: &str = "run1";
 
+/// The options of a plan that change the set-up of the file.
+pub const OF_SET_UP: [&str; 2] = ["--setup-um", "--one-spindle-ball"];
+
 /// How command lines name the session of a report: `abbe plan session.toml --improve`.
 #[derive(Clone, Debug, Default)]
 pub struct Commands {
@@ -76,6 +79,12 @@ impl Commands {
         if self.has_effects { self.on(TRACED, "plan", options) } else { self.command("plan", options) }
     }
 
+    /// Whether a proposed plan may write a session: not with a set-up that is not that of the file.
+    pub fn plan_writes(&self) -> bool {
+        let is_overridden = OF_SET_UP.iter().any(|option| self.made_by.1.contains(option));
+        self.made_by.0 != "plan" || !is_overridden
+    }
+
     /// The command that writes [`TRACED`], if a trace has found effects.
     pub fn declare_effects(&self) -> Option<String> {
         self.has_effects.then(|| self.command("trace", &format!("--write {}", self.beside(TRACED))))
@@ -88,12 +97,18 @@ impl Commands {
         format!("abbe {verb} {session}{}{own} {options}", self.reading).trim_end().to_string()
     }
 
-    /// A file or folder beside the session: another one for a session of this name.
+    /// A file or folder beside the session: another one for a session of this name, and a new one for a folder that exists.
     pub fn beside(&self, name: &str) -> String {
         let session = Path::new(&self.session);
         let is_session = session.file_name().is_some_and(|own| own == name);
         let name = if is_session { format!("after-{name}") } else { name.to_string() };
-        quoted(session.with_file_name(name).display().to_string())
+        let mut place = session.with_file_name(&name);
+        let mut number = 2;
+        while place.extension().is_none() && place.exists() {
+            place.set_file_name(format!("{}{number}", name.trim_end_matches(|digit: char| digit.is_ascii_digit())));
+            number += 1;
+        }
+        quoted(place.display().to_string())
     }
 
     /// A command on a session that a proposed command writes.
@@ -121,6 +136,30 @@ mod tests {
             (unnamed.command("trace", ""), unnamed.beside(NEXT)),
             ("abbe trace SESSION".into(), "next.toml".into())
         );
+    }
+
+    /// A folder of a first round stays: the second round has another one.
+    #[test]
+    fn a_folder_that_exists_is_not_proposed_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let commands = Commands::of(&folder.path().join("s.toml"), None, false);
+        let beside = |name: &str| commands.beside(name);
+        let place = |name: &str| folder.path().join(name);
+        assert_eq!(beside(SIMULATED), quoted(place("run1").display().to_string()));
+        for name in ["run1", "run2", "programs"] {
+            std::fs::create_dir(place(name)).unwrap();
+        }
+        assert_eq!(beside(SIMULATED), quoted(place("run3").display().to_string()));
+        assert_eq!(beside(PROGRAMS), quoted(place("programs2").display().to_string()));
+    }
+
+    /// A plan with another set-up than the file's writes no session.
+    #[test]
+    fn a_plan_of_another_set_up_is_proposed_with_it() {
+        let options = [("--setup-um", "1".to_string())];
+        let commands = Commands::of(Path::new("s.toml"), None, false).made_by("plan", &options);
+        assert_eq!(commands.command("plan", "--improve"), "abbe plan s.toml --setup-um 1 --improve");
+        assert!(!commands.plan_writes() && Commands::default().plan_writes());
     }
 
     /// A command proposes itself with the options on which its result depends, and others without them.

@@ -147,6 +147,10 @@ fn measure(statement: &MeasureStatement, machine: Option<&Machine>, commands: &C
         let declared = commands.declare_effects();
         let mut sentences = vec![what.into()];
         sentences.extend(declared.map(|command| Sentence::Command(command, "declares the effects,".into())));
+        if !commands.plan_writes() {
+            sentences.push(Sentence::Command(commands.plan("--improve"), "describes the test".into()));
+            return sentences;
+        }
         let written = commands.plan(&format!("--improve --write {}", commands.beside(NEXT)));
         let has_program = machine.is_some_and(has_letters);
         let words = if has_program { "writes the test," } else { "writes the test" };

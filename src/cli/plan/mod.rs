@@ -59,6 +59,14 @@ pub struct PlanArguments {
     range: bool,
 }
 
+impl PlanArguments {
+    /// The options of the analysis, which the commands that a report proposes repeat.
+    fn planning(&self) -> PlanningOptions {
+        let &PlanArguments { noise_um, planned, no_effects, setup_um, one_spindle_ball, .. } = self;
+        PlanningOptions { noise_um, planned, no_effects, setup_um, one_spindle_ball }
+    }
+}
+
 /// Examples of `abbe plan`.
 pub const HELP: &str = include_str!("../help/plan.txt");
 
@@ -70,7 +78,11 @@ pub fn run(arguments: &PlanArguments, _: Global) -> Result<(), Failure> {
     // The written session has the mounts and the priors of the file, not those of the command line.
     arguments.improve.refuse_overrides(arguments.one_spindle_ball || arguments.setup_um.is_some())?;
     let (mut session, sources) = read_session(&arguments.session, &outputs)?;
-    set_up::apply(&mut session, arguments.setup_um, arguments.one_spindle_ball)?;
+    if let Some(um) = arguments.setup_um {
+        values::length_um("--setup-um", um)?;
+    }
+    let planning = arguments.planning();
+    planning.set_up(&mut session);
     let session = session;
     let read = Read::session(&session, &sources, common.seed);
     if arguments.patterns.patterns.is_some() {
@@ -101,7 +113,6 @@ pub fn run(arguments: &PlanArguments, _: Global) -> Result<(), Failure> {
     if let Some(sizes) = &arguments.device_mm {
         found.analysis.warnings.extend(set_up::faults(&session, sizes)?);
     }
-    let &PlanArguments { noise_um, planned, .. } = arguments;
-    let commands = arguments.session.commands::<Plan>(1, &PlanningOptions { noise_um, planned, no_effects: false })?;
+    let commands = arguments.session.commands::<Plan>(1, &PlanningOptions { no_effects: false, ..planning })?;
     common.output.put_found(&outputs, &found, &commands, &read)
 }
