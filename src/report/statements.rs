@@ -360,7 +360,7 @@ pub fn of_comparison(
         }
         false => first_of(&changed.collect::<Vec<_>>(), NAMED, ", ", "further difference"),
     };
-    let correct = format!("What to correct: by a change alone nothing; the fit of {last} states what remains");
+    let correct = format!("What to correct: by a change alone nothing; the estimates of {last} state what remains");
     let next = match statements.measure.step {
         NextStep::Repeat => {
             "the last session once more, mounted anew: it tells a change of the machine from one of the set-up"
