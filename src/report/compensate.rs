@@ -63,7 +63,15 @@ fn states(summary: &Summary) -> Table {
         }
     };
     size("largest error at the commands", Some(summary.largest_error_um), Some(summary.largest_error_arcsec));
-    size("largest remaining error of all rows", summary.largest_remaining_um, summary.largest_remaining_arcsec);
+    let name = match summary.without_command() {
+        0 => "largest remaining error of all rows".to_string(),
+        none => {
+            let rows = summary.rows - none;
+            let have = if rows == 1 { "has" } else { "have" };
+            format!("largest remaining error of the {} that {have} a command", counted(rows, "row"))
+        }
+    };
+    size(&name, summary.largest_remaining_um, summary.largest_remaining_arcsec);
     Table::new(["", ">position", ">orientation"], rows)
 }
 

@@ -53,8 +53,8 @@ pub struct Summary {
     pub largest_error_um: f64,
     /// Largest error of the orientation before, arcsec.
     pub largest_error_arcsec: f64,
-    /// Largest remaining error of the position among all rows, those that keep their command included, µm; `null` for
-    /// errors.
+    /// Largest remaining error of the position among all rows that have a command, those that keep theirs included, µm;
+    /// `null` for errors. A pose that is not reachable has none.
     pub largest_remaining_um: Option<f64>,
     /// The same of the orientation, arcsec; `null` for errors.
     pub largest_remaining_arcsec: Option<f64>,
@@ -358,6 +358,12 @@ fn quoted(cell: &str) -> String {
 }
 
 impl Summary {
+    /// Number of rows that have no command: no numbers, or not reachable.
+    pub fn without_command(&self) -> usize {
+        let none = [State::NotANumber, State::NotReachable].map(State::word);
+        self.states.iter().filter(|count| none.contains(&count.state)).map(|count| count.rows).sum()
+    }
+
     fn add(&mut self, block: &Block, rows: &[RowResult], output: Output) {
         self.rows += rows.len();
         for (row, (state, [before_um, before_arcsec, um, arcsec])) in rows.iter().enumerate() {

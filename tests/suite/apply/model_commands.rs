@@ -378,6 +378,10 @@ fn a_summary_covers_all_rows() {
     assert!(printed.contains("Tool point [0.000, 0.000, -120.000] mm in the tool frame."), "{printed}");
     let line = printed.lines().find(|line| line.contains("largest remaining error of all rows")).unwrap();
     assert!(line.contains(&format!("{:.3}″", largest("remaining_arcsec"))), "{line}");
+    // A row without a command has no remaining error, and is not among all.
+    std::fs::write(&commands, "x_mm,y_mm,z_mm,a_deg,c_deg\n10,20,-10,30,40\n#REF!,0,0,0,0\n").unwrap();
+    let printed = success(&abbe(&["compensate", text(&model), text(&commands), "--out", text(&out), "--force"]));
+    assert!(printed.contains("largest remaining error of the 1 row that has a command"), "{printed}");
 }
 
 /// MuJoCo reads the exported chain and moves the tool as the model does.
