@@ -62,8 +62,16 @@ pub fn section(report: &mut Report, model: &ModelResult) {
 
 /// The readings that are excluded as outliers; without `--all`, those with the largest residual.
 fn outliers(outliers: &[Outlier], unit: ReadingUnit) -> Table {
-    let excluded = if outliers.len() == 1 { "is excluded as an outlier" } else { "are excluded as outliers" };
-    let title = format!("{} {excluded}", counted(outliers.len(), "reading"));
+    let firsts = outliers.iter().filter(|outlier| outlier.first_at_reversal).count();
+    let readings = counted(outliers.len(), "reading");
+    let begin = "a run that begins where an axis reverses, so that its lost motion there is not known";
+    let title = match (outliers.len(), firsts) {
+        (1, 0) => format!("{readings} is excluded as an outlier"),
+        (_, 0) => format!("{readings} are excluded as outliers"),
+        (1, _) => format!("{readings} is excluded, the first of {begin}"),
+        (all, firsts) if firsts == all => format!("{readings} are excluded, each the first of {begin}"),
+        (_, firsts) => format!("{readings} are excluded as outliers, {firsts} of them the first of {begin}"),
+    };
     let rows = outliers.iter().map(|o| cells![&o.test, &o.file, o.line.to_string(), of_readings(o.residual_um, unit)]);
     let mut table = Table::new(["test", "file", ">line", ">residual"], rows).titled(title);
     if outliers.len() > MAX_OUTLIERS + 1 {

@@ -65,6 +65,9 @@ pub fn readings(problem: &Problem, model: &ModelResult) -> KeyFigure {
     let tests = counted(problem.tests.len(), "test");
     let excluded = match model.outliers.len() {
         0 => "no outliers".to_string(),
+        some if model.outliers.iter().all(|outlier| outlier.first_at_reversal) => {
+            format!("{} at a reversal excluded", counted(some, "first reading"))
+        }
         some => format!("{} excluded", counted(some, "outlier")),
     };
     KeyFigure::new("Readings", integer(model.readings), format!("{tests}, {excluded}"))

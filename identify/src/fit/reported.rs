@@ -12,6 +12,7 @@ use crate::heldout::cross_validation;
 use crate::heldout::{mislabelled_runs, rms_by_unit_mm, rms_mm};
 use crate::identifiability::weak;
 use crate::noise;
+use crate::noise::outliers::firsts_at_reversal;
 use crate::numerics::rank::Rank;
 use crate::parameter_description::parameter_meaning;
 use crate::plausibility;
@@ -279,6 +280,7 @@ pub fn outliers(problem: &Problem, fit: &Fit) -> Vec<Outlier> {
     for (number, test) in problem.tests.iter().enumerate() {
         let Some(readings) = &test.readings else { continue };
         let (origin, channels) = (readings.origin.as_ref(), problem.channels(number));
+        let firsts = firsts_at_reversal(readings);
         for row in (0..readings.rows()).filter(|row| problem.rejected[number][*row]) {
             let residual = &fit.residuals[number][row * channels..(row + 1) * channels];
             list.push(Outlier {
@@ -286,6 +288,7 @@ pub fn outliers(problem: &Problem, fit: &Fit) -> Vec<Outlier> {
                 file: origin.map_or(String::new(), |origin| origin.file.display().to_string()),
                 line: readings.line(row).unwrap_or(0),
                 residual_um: residual.iter().map(|v| v * v).sum::<f64>().sqrt() * 1e3,
+                first_at_reversal: firsts.contains(&row),
             });
         }
     }

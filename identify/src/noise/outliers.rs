@@ -249,8 +249,7 @@ fn retain_unrepeated(rows: &mut Vec<(usize, f64)>, readings: &Readings, deviatio
     let ordered: HashMap<&[i64], Ordered> = (repeats.into_iter())
         .map(|(key, rows)| (key, Ordered::of(rows.into_iter().map(|row| deviations[row]))))
         .collect();
-    let begins: Vec<usize> =
-        readings.runs().iter().filter(|run| begins_at_reversal(readings, run)).map(|run| run.start).collect();
+    let begins = firsts_at_reversal(readings);
     rows.retain(|(row, limit)| {
         if begins.contains(row) {
             return true;
@@ -263,6 +262,11 @@ fn retain_unrepeated(rows: &mut Vec<(usize, f64)>, readings: &Readings, deviatio
 /// Share of the second step of an axis below which its first step is one from rest. From the end of a circle's diameter it
 /// is a third; at constant speed both are equal.
 const FROM_REST: f64 = 0.5;
+
+/// The first readings of the runs that begin where an axis reverses: the axis came from either side.
+pub fn firsts_at_reversal(readings: &Readings) -> Vec<usize> {
+    readings.runs().iter().filter(|run| begins_at_reversal(readings, run)).map(|run| run.start).collect()
+}
 
 /// Whether a run begins where an axis reverses.
 fn begins_at_reversal(readings: &Readings, run: &Range<usize>) -> bool {

@@ -66,6 +66,9 @@ fn the_first_reading_at_a_reversal_makes_no_effect() {
         let place = found.iter().position(|name| name == "EXX~X:backlash").unwrap();
         let lost = &result.effects[place].parameters[0];
         assert!((lost.value.abs() - 4.0).abs() < 4.0 * lost.u, "{lost:?}");
+        // What is excluded is said to be no fault.
+        let excluded = &result.after.outliers;
+        assert!(!excluded.is_empty() && excluded.iter().all(|one| one.first_at_reversal), "{excluded:?}");
     }
 }
 
