@@ -4,11 +4,12 @@ use crate::report::block::{Body, Report, Text};
 use crate::report::table::{Cell, Table};
 
 /// A cell that a spreadsheet takes for text: one that begins as a formula does (`=`, `+`, `-`, `@`) and is no number
-/// stands behind an apostrophe.
+/// stands behind an apostrophe. A sign alone, such as a direction of travel, is no formula.
 ///
 /// Names in a table come from session files, which others may have written.
 pub fn cell(text: String) -> String {
-    let formula = text.trim_start().starts_with(['=', '+', '-', '@']) || text.starts_with(['\t', '\r', '\n']);
+    let begins = text.trim_start().starts_with(['=', '+', '-', '@']) && text.trim().len() > 1;
+    let formula = begins || text.starts_with(['\t', '\r', '\n']);
     if formula && text.parse::<f64>().is_err() { format!("'{text}") } else { text }
 }
 
@@ -58,4 +59,19 @@ pub fn report(report: &Report) -> Result<Vec<u8>, String> {
 fn titled(title: &str, table: &Table) -> Result<Vec<u8>, String> {
     let comment: String = title.lines().map(|line| format!("# {line}\n")).collect();
     Ok([comment.as_bytes(), &text(table)?].concat())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_may_be_a_formula_stands_behind_an_apostrophe() {
+        for plain in ["+", "-", "−3", "-3.5", "+1e-3", "EX0C", "a=b"] {
+            assert_eq!(cell(plain.to_string()), plain);
+        }
+        for formula in ["=1+1", "+A1", "-A1", "@SUM(A1)", " =1", "\tx"] {
+            assert_eq!(cell(formula.to_string()), format!("'{formula}"));
+        }
+    }
 }
