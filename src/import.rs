@@ -200,10 +200,14 @@ pub fn import(files: &[Foreign], target: Target<'_>, options: &ImportOptions) ->
     Ok(Imported { files: draft.files(), session, result })
 }
 
-/// Whether an error of [`import()`] is one of the session that would be written, which lacks a key or has a wrong one.
-pub fn is_of_new_session(error: &IdentifyError) -> bool {
+/// What an error of [`import()`] lacks, as `bar_mm=100`, if it is one of the session that would be written, which lacks a key or
+/// has a wrong one.
+pub fn key_of_new_session(error: &IdentifyError) -> Option<String> {
     let place = if let IdentifyError::Model(cause) = error { cause.location() } else { None };
-    place.is_some_and(|place| place.file == Path::new(SESSION_FILE))
+    place.filter(|place| place.file == Path::new(SESSION_FILE))?;
+    let said = error.to_string();
+    let key = said.split_once("no `").and_then(|(_, key)| key.split_once('`')).map(|(key, _)| key);
+    Some(key.filter(|key| *key != "bar_mm").map_or("bar_mm=100".to_string(), |key| format!("{key}=VALUE")))
 }
 
 /// The error of a fault of a file.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use abbe::files::import::{Foreign, Hint, session};
 use abbe::files::store::Store;
 use abbe::identify::IdentifyError;
-use abbe::import::{ImportOptions, Target, import, is_of_new_session};
+use abbe::import::{ImportOptions, Target, import, key_of_new_session};
 use abbe::model::instrument;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
@@ -107,10 +107,12 @@ pub fn run(arguments: &ImportArguments, _: Global) -> Result<(), Failure> {
 
 /// What the command can do about readings that contradict the machine, or about keys that its session lacks.
 fn refused(error: IdentifyError) -> Failure {
-    let note = match &error {
-        IdentifyError::Contradicted { .. } => "--allow-implausible writes the session all the same",
-        error if is_of_new_session(error) => "--set states a key of the new tests, as in --set bar_mm=100",
-        _ => return error.into(),
+    let note = if let IdentifyError::Contradicted { .. } = error {
+        "--allow-implausible writes the session all the same".to_string()
+    } else if let Some(key) = key_of_new_session(&error) {
+        format!("--set states a key of the new tests, as in --set {key}")
+    } else {
+        return error.into();
     };
     tell(Kind::Note, &format!("nothing is written; {note}"));
     error.into()

@@ -257,6 +257,11 @@ fn a_key_that_the_new_session_lacks_is_stated_with_set() {
     let said = message(&output);
     assert!(!output.status.success() && !out.exists(), "{said}");
     assert!(said.contains("no `bar_mm`") && said.contains("--set bar_mm=100"), "{said}");
+    // Of another instrument the key that it lacks.
+    std::fs::write(&file, "c_deg,x_mm,y_mm,z_mm,dx_um,dy_um,dz_um\n0,100,0,0,1,2,3\n10,98.48,17.36,0,1,2,3\n").unwrap();
+    let output = super::abbe(&["import", text(&file), "--machine", text(&machine), "--out", text(&out)]);
+    let said = message(&output);
+    assert!(said.contains("no `setting`") && said.contains("--set setting=VALUE"), "{said}");
 }
 
 /// One cell without a date leaves the others as they are: days of December, no 12th of several months.
