@@ -423,4 +423,39 @@ mod tests {
         assert_eq!(changed.len(), 1);
         assert_eq!((changed[0].id.as_str(), changed[0].change, changed[0].u), ("EX0C", -2.0, 1.5));
     }
+
+    /// A line and a wave explain a parabola together. Where the parabola takes the place of the line, as a more probable alias
+    /// does, the wave explains nothing.
+    #[test]
+    fn an_effect_that_explains_nothing_beside_an_exchanged_one_is_dropped() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut rows = "run,x_mm,deviation_um\n".to_string();
+        for (run, k) in (0..34).map(|row| (1 + row / 17, if row < 17 { row } else { 33 - row })) {
+            let x = 25.0 * f64::from(k) - 200.0;
+            let noise = 0.05 * (12.9898 * x + f64::from(run)).sin();
+            rows += &format!("{run},{x},{:.4}\n", 0.03 * x + 1e-4 * x * x + noise);
+        }
+        std::fs::write(folder.path().join("x.csv"), rows).unwrap();
+        let shapes = ["\"polynomial\"\norder = 1", "\"polynomial\"\norder = 2", "\"periodic\"\nperiod_mm = 400"];
+        let [line, parabola, wave] = shapes.map(|shape| {
+            let text = format!(
+                "[machine]\nchain = \"w b X Y Z t\"\naxis.X = {{}}\naxis.Y = {{}}\naxis.Z = {{}}\n\
+                 [instrument]\nkind = \"laser\"\nnoise_um = 0.05\n[unknowns]\nerrors = []\n\
+                 [[effect]]\ncomponent = \"EXX\"\nshape = {shape}\n\
+                 [[test]]\nname = \"LX\"\ndata = \"x.csv\"\nreflector_mm = [0, 0, 0]\nbeam = [1, 0, 0]\n"
+            );
+            let file = folder.path().join("session.toml");
+            std::fs::write(&file, text).unwrap();
+            abbe_files::session(&file, &abbe_files::ReadOptions::default()).unwrap()
+        });
+        let mut session = line.clone();
+        session.effects.clear();
+        let explains = |other: &abbe_model::session::Session| {
+            let effects = [other.effects[0].clone(), wave.effects[0].clone()];
+            let (problem, fit) = prepare_with(&session, &effects, 1).unwrap();
+            [0, 1].map(|number| explained(&problem, &fit, number) > EXPLAINS_NOTHING)
+        };
+        assert_eq!(explains(&line), [true, true]);
+        assert_eq!(explains(&parabola), [true, false]);
+    }
 }
