@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     session.effects.extend(traced.effects);
     let after = SessionFit::of(&session, 1)?;
-    let held_out_um = [&before, &after].map(|fit| fit.result.model.heldout_rms_um);
+    let held_out_um = [&before, &after].map(|fit| fit.result.model.fit.heldout_rms_um);
     println!("held-out rms {:.3} µm before, {:.3} µm after", held_out_um[0], held_out_um[1]);
     Ok(())
 }

@@ -87,7 +87,7 @@ pub mod prelude {
     pub use abbe_files::read::add_node;
     pub use abbe_files::table::memory::MemoryColumn;
     pub use abbe_identify::quantity::Given;
-    pub use abbe_identify::results::{FitResult, ParameterResult, TraceResult};
+    pub use abbe_identify::results::{Estimate, FitResult, TraceResult};
     pub use abbe_identify::simulate::{Simulated, Simulation, simulate};
     pub use abbe_model::chain::Machine;
     pub use abbe_model::component::ErrorName;

@@ -31,7 +31,7 @@
 //!
 //! let (problem, found) = fit::prepare(&session, 1)?;
 //! let declared = fit::report(&problem, &found)?;
-//! assert!((declared.model.rms_um - 0.548).abs() < 0.001);
+//! assert!((declared.model.fit.rms_um - 0.548).abs() < 0.001);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

@@ -7,6 +7,8 @@
 
 use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use crate::numerics::parallel;
 
@@ -42,13 +44,14 @@ pub struct Draws<'a> {
 }
 
 /// Number of runs, seed and coverage probability of a Monte Carlo propagation.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct MonteCarlo {
     /// Number of runs.
     pub runs: u64,
-    /// Seed.
+    /// Seed of the runs.
     pub seed: u64,
-    /// Coverage probability of the intervals.
+    /// Coverage probability of the intervals, 0 to 1.
+    #[serde(rename = "coverage_probability")]
     pub coverage: f64,
 }
 

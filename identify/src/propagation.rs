@@ -21,7 +21,7 @@ use crate::fit::Fit;
 use crate::monte_carlo::{self, Distribution, Draws, MonteCarlo};
 use crate::numerics::tails::normal_quantile;
 use crate::problem::Problem;
-use crate::results::{DrawnParameter, FitMonteCarlo, FitResult, ParameterResult, Verdict, phases_follow_amplitudes};
+use crate::results::{DrawnParameter, Estimate, FitMonteCarlo, FitResult, Verdict, phases_follow_amplitudes};
 use crate::tolerance::conformity;
 use refit::Refit;
 
@@ -57,7 +57,7 @@ pub fn add_monte_carlo(
     // The draws are those of the noise, with a linear model. What uncertainties cover beside it, aliases, positions of steps and
     // numbers of shapes, is added.
     let of_noise = fit::parameters_of_noise(problem, fit);
-    let is_drawn = |parameter: &ParameterResult| !problem.parameters.is_position(&parameter.id);
+    let is_drawn = |parameter: &Estimate| !problem.parameters.is_position(&parameter.id);
     let parameters: Vec<DrawnParameter> = of_noise
         .iter()
         .filter(|parameter| is_drawn(parameter))
@@ -79,13 +79,7 @@ pub fn add_monte_carlo(
             .warnings
             .push(format!("{unconverged} of {} could not be fitted and are excluded", counted(draws.runs, "draw")));
     }
-    result.monte_carlo = Some(FitMonteCarlo {
-        runs: draws.runs,
-        seed: draws.seed,
-        coverage_probability: draws.coverage,
-        unconverged_runs: unconverged,
-        parameters,
-    });
+    result.monte_carlo = Some(FitMonteCarlo { draws: *draws, unconverged_runs: unconverged, parameters });
     Ok(())
 }
 

@@ -8,6 +8,8 @@ use abbe_model::document::node::{Named, Node};
 use abbe_model::document::value::Long;
 use abbe_model::session::limits::{LARGEST, MAX_LENGTH_MM};
 use abbe_model::words::number as number_in_words;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use crate::error::IdentifyError;
 use crate::unit::{ARCSEC, Unit};
@@ -21,7 +23,8 @@ use crate::unit::{ARCSEC, Unit};
 /// assert_eq!((given.id.as_str(), given.value, given.unit.as_str()), ("EB0A", -1.3, "arcsec"));
 /// # Ok::<(), abbe_identify::IdentifyError>(())
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "TrueValue", description = "The true value of a parameter.")]
 pub struct Given {
     /// The identifier in results, or the literature name: `EY0A`, `e_y0a`, `bar[A100]`, `EZC~C:h2.amplitude`.
     pub id: String,

@@ -20,7 +20,7 @@ use crate::fit::{Fit, parameters};
 use crate::numerics::tails::{chi_square_tails, normal_tail};
 use crate::parameters::Role;
 use crate::problem::Problem;
-use crate::results::ParameterResult;
+use crate::results::Estimate;
 
 /// Significance level over all comparisons together.
 const SIGNIFICANCE: f64 = 0.01;
@@ -33,7 +33,7 @@ pub struct Session {
     /// Machine, instrument and tests in words. Sessions with different plans are not repeats.
     plan: String,
     /// Errors and coefficients of effects.
-    parameters: Vec<ParameterResult>,
+    parameters: Vec<Estimate>,
 }
 
 impl Session {
@@ -201,7 +201,7 @@ fn same_plan(first: &Session, other: &Session) -> Result<(), IdentifyError> {
     Err(fault(format!("its readings identify {} in addition, but not {}", list(&own, &known), list(&known, &own))))
 }
 
-fn over_sessions(parameter: &ParameterResult, values: &[(f64, f64)], significance: f64) -> RepeatedParameter {
+fn over_sessions(parameter: &Estimate, values: &[(f64, f64)], significance: f64) -> RepeatedParameter {
     let count = values.len() as f64;
     let mean = values.iter().map(|(x, _)| x).sum::<f64>() / count;
     let free = count - 1.0;

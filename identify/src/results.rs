@@ -13,16 +13,15 @@ pub mod validation;
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::circular::CircularTest;
-use crate::noise::NoiseSource;
+use crate::noise::ReadingNoise;
 use crate::plausibility::Plausibility;
 use crate::positioning::PositioningTest;
 use crate::positioning::diagonal::{DiagonalTest, LargestOfDiagonals};
 use crate::straightness::StraightnessTest;
 use crate::tolerance::Conformity;
-use crate::unit::ReadingUnit;
 pub use base::BaseResult;
 pub use cross_validation::{CrossValidation, TestNotLeftOut};
 pub use monte_carlo::{DrawnParameter, FitMonteCarlo, Verdict};
@@ -32,19 +31,20 @@ pub use outcome::{
 };
 pub(crate) use parameter::{COVERAGE_FACTOR, phases_follow_amplitudes};
 pub use parameter::{
-    Combination, Covariance, DeterminedBy, EnlargedBy, Finding, Interval, NullSpace, ParameterResult, Unobservable,
+    Combination, Covariance, DeterminedBy, EnlargedBy, Estimate, Finding, Interval, MeasuredValue, NullSpace,
+    ParameterChange, Unobservable,
 };
 pub use pointing::{PointingTerm, PointingTerms};
 pub use statements::{
     AxisCorrection, GoodStatement, LineQuantity, MeasureStatement, NextStep, Statements, ValidationStatement,
 };
 pub use trace::{
-    AliasResult, AlternativeResult, ChangedParameter, CurvePoint, EffectName, EffectResult, LargestOrder, PriorResult,
-    RejectedCandidate, Remainder, SeparatingTestResult, SeparationResult, ShapeParameter, TraceResult,
+    AliasResult, AlternativeResult, CurvePoint, EffectName, EffectResult, LargestOrder, PriorResult, RejectedCandidate,
+    Remainder, SeparatingTestResult, SeparationResult, ShapeParameter, TraceResult,
 };
 
 /// A reading that was excluded as an outlier.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Outlier {
     /// The test.
     pub test: String,
@@ -61,7 +61,7 @@ pub struct Outlier {
 }
 
 /// Figures of the angles of a session of lengths and angles.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct OfAngles {
     /// Standard deviation of one angle, arcsec.
     pub noise_arcsec: f64,
@@ -71,26 +71,32 @@ pub struct OfAngles {
     pub heldout_rms_arcsec: f64,
 }
 
-/// A model of the readings: its estimates with their uncertainties, its residual, its held-out error, and what it does not
-/// determine. A fit is one; a trace has one before and one with the effects that it found.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
-pub struct ModelResult {
-    /// The unit of the figures of readings, in which their keys end; absent for µm.
-    #[serde(skip_serializing_if = "ReadingUnit::is_micrometre")]
-    pub reading_unit: ReadingUnit,
-    /// Standard deviation of one scalar reading, µm.
-    pub noise_um: f64,
-    /// Source of `noise_um`: `stated` by the session, `repeats` (repeated readings), or `residual` where there is
-    /// neither. The residual of the declared model also holds what the model lacks.
-    pub noise_source: NoiseSource,
-    /// Autoregressive coefficients of the noise along a run; empty for white noise.
-    pub noise_ar_coefficients: Vec<f64>,
+/// How well a model describes its readings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ModelFit {
     /// Number of readings without outliers.
     pub readings: usize,
     /// Rms of the residual over scalar readings, µm.
     pub rms_um: f64,
     /// Rms of the residual over held-out scalar readings (cross-validation), µm. `heldout_by` states what is held out.
     pub heldout_rms_um: f64,
+    /// Factor by which the uncertainties are enlarged: the Birge ratio where it is significantly above 1 (p < 0.001),
+    /// else 1.
+    pub u_enlargement: f64,
+}
+
+/// A model of the readings: its estimates with their uncertainties, its residual, its held-out error, and what it does not
+/// determine. A fit is one; a trace has one before and one with the effects that it found.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ModelResult {
+    /// The noise of a reading.
+    #[serde(flatten)]
+    pub noise: ReadingNoise,
+    /// Autoregressive coefficients of the noise along a run; empty for white noise.
+    pub noise_ar_coefficients: Vec<f64>,
+    /// How well it describes its readings.
+    #[serde(flatten)]
+    pub fit: ModelFit,
     /// Rms length of the residual vector, µm, for instruments with three coordinates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_3d_um: Option<f64>,
@@ -115,13 +121,10 @@ pub struct ModelResult {
     pub degrees_of_freedom: usize,
     /// The Birge ratio `√(χ²/ν)`. Below 1 where readings scatter less than `noise_um`.
     pub birge_ratio: f64,
-    /// Factor by which the uncertainties are enlarged: the Birge ratio where it is significantly above 1 (p < 0.001),
-    /// else 1.
-    pub u_enlargement: f64,
     /// What the result is worth: the residual against the noise, what determines the estimates, what is assumed.
     pub outcome: Outcome,
     /// The identifiable parameters.
-    pub parameters: Vec<ParameterResult>,
+    pub parameters: Vec<Estimate>,
     /// Identifiers of all identifiable parameters, set-up parameters included.
     pub identifiable: Vec<String>,
     /// Covariance of `parameters`.

@@ -42,8 +42,8 @@ pub struct Simulation {
 pub struct Simulated {
     /// The readings of each test, in the order of the session.
     pub readings: Vec<Readings>,
-    /// Every value that is not zero: name, value, unit.
-    pub truth: Vec<(String, f64, String)>,
+    /// Every value that is not zero.
+    pub truth: Vec<Given>,
     /// Standard deviation of the noise of a length, mm.
     pub noise_mm: f64,
     /// Standard deviation of the noise of an angle, rad.
@@ -67,34 +67,21 @@ pub struct SimulationResult {
     /// Resolution of the readings, µm; `null` for none.
     pub resolution_um: Option<f64>,
     /// The parameters that are not zero.
-    pub truth: Vec<TrueValue>,
+    pub truth: Vec<Given>,
     /// Warnings in words.
     pub warnings: Vec<String>,
-}
-
-/// The true value of a parameter.
-#[derive(Serialize, JsonSchema)]
-pub struct TrueValue {
-    /// Identifier: `EY0A`, `bar[A100]`, `EZC~C:h2.cos`.
-    pub id: String,
-    /// The value, in `unit`.
-    pub value: f64,
-    /// `um`, `arcsec`, …
-    pub unit: String,
 }
 
 impl SimulationResult {
     /// Of a simulation that was written to this session file.
     pub fn of(session: &Session, simulated: &Simulated, file: &Path) -> SimulationResult {
-        let truth = simulated.truth.iter();
-        let truth = truth.map(|(id, value, unit)| TrueValue { id: id.clone(), value: *value, unit: unit.clone() });
         SimulationResult {
             written_session: file.display().to_string(),
             readings: simulated.readings.iter().map(|readings| readings.rows()).sum(),
             noise_um: simulated.noise_mm * 1e3,
             noise_arcsec: session.units().angles.then_some(simulated.noise_rad * ARCSEC),
             resolution_um: session.resolution_mm.map(|step| step * 1e3),
-            truth: truth.collect(),
+            truth: simulated.truth.clone(),
             warnings: simulated.warnings.clone(),
         }
     }
@@ -223,7 +210,7 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
         .filter(|(_, value)| **value != 0.0)
         .map(|(parameter, value)| {
             let unit = &parameter.unit;
-            (parameter.id.clone(), value * unit.display_per_internal, unit.name.clone())
+            Given { id: parameter.id.clone(), value: value * unit.display_per_internal, unit: unit.name.clone() }
         })
         .collect();
     Ok(Simulated { readings, truth, noise_mm, noise_rad, warnings })

@@ -24,9 +24,9 @@ use crate::plausibility::{Conflict, ConflictKind, Plausibility, likely_unit};
 use crate::problem::Problem;
 use crate::results::validation::{MovedParameter, ValidationResult, ValidationVerdict};
 use crate::results::{
-    AxisCorrection, Covariance, DeterminedBy, Finding, FitResult, GoodStatement, Goodness, GoodnessVerdict,
-    LineQuantity, MeasureStatement, ModelResult, NextStep, NotJudged, ParameterResult, Statements, TraceResult,
-    Unobservable, ValidationStatement,
+    AxisCorrection, Covariance, DeterminedBy, Estimate, Finding, FitResult, GoodStatement, Goodness, GoodnessVerdict,
+    LineQuantity, MeasureStatement, ModelResult, NextStep, NotJudged, Statements, TraceResult, Unobservable,
+    ValidationStatement,
 };
 use crate::tolerance::Conformity;
 use crate::tolerance::rule::Decision;
@@ -186,7 +186,7 @@ fn good(model: &ModelResult, conformity: Option<&Conformity>) -> GoodStatement {
 type Terms = Vec<(ErrorName, f64)>;
 
 /// The axis lines with identified location errors.
-fn corrections(machine: &Machine, parameters: &[ParameterResult], covariance: &Covariance) -> Vec<AxisCorrection> {
+fn corrections(machine: &Machine, parameters: &[Estimate], covariance: &Covariance) -> Vec<AxisCorrection> {
     let mut found = Vec::new();
     for index in 0..machine.axes.len() {
         let axis = &machine.axes[index];
@@ -272,7 +272,7 @@ fn zero_terms(axis: &Axis, nearest: usize) -> Terms {
 
 /// What exceeds its expanded uncertainty, is no set-up parameter and changes no axis line: the most significant coefficient
 /// of each effect, constant errors, shifts of a rotary axis along itself.
-fn further(problem: &Problem, parameters: &[ParameterResult]) -> Vec<ParameterResult> {
+fn further(problem: &Problem, parameters: &[Estimate]) -> Vec<Estimate> {
     let machine = &problem.session.machine;
     let is_of_line = |id: &str| {
         let Some(name) = ErrorName::parse(id).filter(|name| name.kind == ErrorKind::Location) else { return false };
@@ -286,8 +286,8 @@ fn further(problem: &Problem, parameters: &[ParameterResult]) -> Vec<ParameterRe
             }
         })
     };
-    let ratio = |found: &ParameterResult| (found.value / found.u).abs();
-    let mut list: Vec<(Option<usize>, ParameterResult)> = Vec::new();
+    let ratio = |found: &Estimate| (found.value / found.u).abs();
+    let mut list: Vec<(Option<usize>, Estimate)> = Vec::new();
     // The phase of an amplitude and the numbers of a shape are no sizes.
     for found in parameters.iter().filter(|found| found.exceeds_u() && !found.id.ends_with(".phase")) {
         // The order of another effect may continue an identifier: `EZC~C:h2` and `EZC~C:h2.5`.
@@ -318,7 +318,7 @@ fn correction(
     (quantity, coordinate): (LineQuantity, char),
     nominal: f64,
     terms: &[(ErrorName, f64)],
-    (parameters, covariance): (&[ParameterResult], &Covariance),
+    (parameters, covariance): (&[Estimate], &Covariance),
 ) -> Option<AxisCorrection> {
     // Index and change of the component in mm or 1 per unit of the parameter.
     let own: Vec<(usize, f64)> = (terms.iter())

@@ -38,7 +38,7 @@ fn the_offset_of_an_axis_is_found_in_readings_in_memory() {
     add_node(&mut session, "test", test.into(), &columns).unwrap();
     let (problem, found) = fit::prepare(&session, 1).unwrap();
     let report = fit::report(&problem, &found).unwrap();
-    assert_eq!(report.model.readings, 360);
+    assert_eq!(report.model.fit.readings, 360);
     for (name, expected) in ["EX0C", "EY0C"].into_iter().zip(OFFSET) {
         let parameter = report.model.parameters.iter().find(|parameter| parameter.id == name).unwrap();
         assert!((parameter.value - expected * 1e3).abs() < 3.0 * parameter.u, "{name}: {}", parameter.value);

@@ -8,7 +8,7 @@ use super::{budget, collision, effects, indices, sensitivity, states};
 use crate::PlanError;
 use abbe_identify::identifiability;
 use abbe_identify::linear::{Linearisation, is_of_interest};
-use abbe_identify::noise::{Noise, NoiseSource};
+use abbe_identify::noise::{Noise, NoiseSource, ReadingNoise};
 use abbe_identify::parameter_description::parameter_meaning;
 use abbe_identify::problem::Problem;
 
@@ -113,9 +113,7 @@ fn analyse_problem(problem: &Problem, travel_mm: f64) -> Result<PlanAnalysis, Pl
     let clearances = collision::clearances(&problem.session);
     warnings.extend(collision::warnings(&problem.session, &clearances));
     Ok(PlanAnalysis {
-        reading_unit: problem.unit(),
-        noise_um: problem.noise.sigma_mm * 1e3,
-        noise_source: problem.noise.source,
+        noise: ReadingNoise::of(problem),
         readings: problem.readings(),
         rank: linear.rank.identifiable_basis.ncols(),
         parameter_count: list.len(),

@@ -5,20 +5,15 @@ use serde::Serialize;
 
 use super::collision::TestClearance;
 use abbe_identify::identifiability::NearDependency;
-use abbe_identify::noise::NoiseSource;
+use abbe_identify::noise::ReadingNoise;
 use abbe_identify::results::{DeterminedByPrior, Unobservable};
-use abbe_identify::unit::ReadingUnit;
 
 /// Identifiability and predicted uncertainties of planned tests.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct PlanAnalysis {
-    /// Standard deviation of one scalar reading, µm.
-    pub noise_um: f64,
-    /// The unit of the figures of readings, in which their keys end; absent for µm.
-    #[serde(skip_serializing_if = "ReadingUnit::is_micrometre")]
-    pub reading_unit: ReadingUnit,
-    /// Source of `noise_um`: `stated` by session or user, `repeats` or `residual` of its readings, or `assumed`.
-    pub noise_source: NoiseSource,
+    /// The noise of a reading.
+    #[serde(flatten)]
+    pub noise: ReadingNoise,
     /// Number of readings.
     pub readings: usize,
     /// Numerical rank: number of independent combinations of the parameters that are identifiable.

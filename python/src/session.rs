@@ -309,7 +309,8 @@ impl Session {
                 session.noise_rad = noise_rad;
                 sources.text.set_noise_of_angles(noise_arcsec);
             }
-            Ok((State::new(session, sources, Origin::default()), simulated.truth, simulated.warnings))
+            let truth = simulated.truth.into_iter().map(|own| (own.id, own.value, own.unit));
+            Ok((State::new(session, sources, Origin::default()), truth.collect(), simulated.warnings))
         })?;
         Ok((Session::of(next), truth, warnings))
     }

@@ -71,7 +71,9 @@ def test_the_dataset_has_its_schema_and_values(finished, tmp_path):
     rows = dataset.sql(f"from parameters where key = '{record['key']}' order by position").fetchall()
     names = list(abbe.fleet.SCHEMAS["parameters"])
     found = [dict(zip(names, row)) for row in rows]
-    assert [row["id"] for row in found] == [parameter["id"] for parameter in record["parameters"]]
+    model = record["model"]
+    listed = [*model["parameters"], *model["outcome"].get("not_estimated", [])]
+    assert [row["id"] for row in found] == [parameter["id"] for parameter in listed]
     covariance = np.array([row["covariance"] for row in found if row["identifiable"]])
     assert np.allclose(covariance, covariance.T)
     assert np.sqrt(np.diag(covariance)) == pytest.approx([row["u"] for row in found if row["identifiable"]])

@@ -79,15 +79,15 @@ def records(fleet):
 
 
 def fitted(records):
-    return [record for record in records if record["rms_um"] is not None]
+    return [record for record in records if record["model"]]
 
 
 def series(records):
     """Date, value and u of the identifiable parameters that have a history, by machine, parameter and unit."""
     found = defaultdict(list)
     for record in sorted(fitted(records), key=lambda record: record["when"]):
-        for own in record["parameters"]:
-            if own["identifiable"] and "[" not in own["id"] and not own["id"].endswith(".phase"):
+        for own in record["model"]["parameters"]:
+            if "[" not in own["id"] and not own["id"].endswith(".phase"):
                 key = (record["machine_id"], own["id"], own["unit"])
                 found[key].append((record["when"], own["value"], own["u"]))
     return found
@@ -106,7 +106,7 @@ def most_frequent(rows):
 
 def worst_machines(records):
     last = {record["machine_id"]: record for record in sorted(fitted(records), key=lambda record: record["when"])}
-    rows = [(machine, record["when"], record["rms_um"]) for machine, record in last.items()]
+    rows = [(machine, record["when"], record["model"]["rms_um"]) for machine, record in last.items()]
     assert {"M0", "M1", "M2", "M3"} == set(last)
     return sorted(rows, key=lambda row: (-row[2], row[0]))
 
@@ -156,9 +156,8 @@ def failures(records):
 def sizes(records):
     own = defaultdict(list)
     for record in fitted(records):
-        for parameter in record["parameters"]:
-            if parameter["identifiable"]:
-                own[parameter["id"], parameter["unit"]].append((parameter["value"], parameter["u"]))
+        for parameter in record["model"]["parameters"]:
+            own[parameter["id"], parameter["unit"]].append((parameter["value"], parameter["u"]))
     rows = []
     for (id, unit), pairs in own.items():
         values, u = zip(*pairs)
@@ -169,8 +168,10 @@ def sizes(records):
 def not_identifiable(records):
     own = defaultdict(list)
     for record in fitted(records):
-        for parameter in record["parameters"]:
-            own[parameter["id"]].append(not parameter["identifiable"])
+        for parameter in record["model"]["parameters"]:
+            own[parameter["id"]].append(False)
+        for parameter in record["model"]["outcome"].get("not_estimated", []):
+            own[parameter["id"]].append(True)
     rows = [(id, np.mean(flags), len(flags)) for id, flags in own.items()]
     rows.sort(key=lambda row: (-row[1], row[0]))
     assert rows[0] == ("EZ0C", 0.5, 4)
@@ -182,8 +183,8 @@ def noise_by_month(records):
     rows = []
     for month, group in groupby(own, key=lambda record: record["when"].strftime("%Y-%m")):
         of_month = list(group)
-        noise = median(record["noise_um"] for record in of_month)
-        rows.append((month, len(of_month), noise, median(record["rms_um"] for record in of_month)))
+        noise = median(record["model"]["noise_um"] for record in of_month)
+        rows.append((month, len(of_month), noise, median(record["model"]["rms_um"] for record in of_month)))
     assert [row[1] for row in rows] == [1, 4, 4, 4, 4, 3, 3]
     return rows
 
@@ -203,9 +204,8 @@ def changes(records):
 def correlations(records):
     latest = max(fitted(records), key=lambda record: record["when"])
     assert latest["machine_id"] == LATEST and latest["error"]["stage"] == "validate"
-    ids = [parameter["id"] for parameter in latest["parameters"] if parameter["identifiable"]]
-    lower = np.zeros((len(ids), len(ids)))
-    lower[np.tril_indices(len(ids))] = latest["covariance"]
+    ids = latest["model"]["covariance"]["ids"]
+    lower = np.array(latest["model"]["covariance"]["matrix"])
     u = np.sqrt(np.diag(lower))
     rows = [(ids[a], ids[b], lower[b, a] / (u[a] * u[b])) for a, b in combinations(range(len(ids)), 2)]
     assert len(rows) >= 3

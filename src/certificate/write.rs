@@ -2,7 +2,7 @@
 
 use std::io;
 
-use abbe_identify::results::{DeterminedBy, FitResult, ParameterResult};
+use abbe_identify::results::{DeterminedBy, Estimate, FitResult};
 use abbe_identify::tolerance::rule::Decision;
 use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName};
@@ -24,7 +24,7 @@ pub struct Contents<'c> {
     pub result: &'c FitResult,
     pub stated: &'c Stated<'c>,
     /// Its errors, each with its unit of D-SI.
-    pub certified: Vec<(&'c ParameterResult, &'static str)>,
+    pub certified: Vec<(&'c Estimate, &'static str)>,
     /// Estimates that it leaves out.
     pub coefficients: Vec<&'c str>,
     /// Errors that the readings do not determine.
@@ -332,7 +332,7 @@ fn method(contents: &Contents) -> String {
     let ratio = result.model.chi_square / result.model.degrees_of_freedom.max(1) as f64;
     format!(
         "{} readings, {} of them excluded as outliers; chi-square over degrees of freedom {ratio:.3}; expanded uncertainty U = 2u from the covariance of the fit, with the stated uncertainties of the set-up.",
-        result.model.readings + result.model.outliers.len(),
+        result.model.fit.readings + result.model.outliers.len(),
         result.model.outliers.len(),
     )
 }

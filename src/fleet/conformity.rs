@@ -41,33 +41,22 @@ pub struct ItemHistory {
 pub struct DecisionPoint {
     /// Day of the session.
     pub days: f64,
-    /// The measured value, in `unit`; `null` where there is none.
-    pub value: Option<f64>,
-    /// Its standard uncertainty, in `unit`.
-    pub u: Option<f64>,
-    /// Unit of all numbers: `um`, `arcsec`.
-    pub unit: String,
-    /// The lower limit, in `unit`; `null` without one.
-    pub lower: Option<f64>,
-    /// The upper limit, in `unit`.
-    pub upper: f64,
     /// The decision.
-    pub decision: Decision,
-    /// Why it is undecided, in words; `null` otherwise.
-    pub why: Option<String>,
+    #[serde(flatten)]
+    pub item: ConformityItem,
 }
 
 impl ItemHistory {
     /// The latest decision, and the first day from which on the decision is the same; `None` without decisions.
     pub fn latest(&self) -> Option<(Decision, f64)> {
         let last = self.points.last()?;
-        let since = self.points.iter().rev().take_while(|point| point.decision == last.decision).last()?;
-        Some((last.decision, since.days))
+        let since = self.points.iter().rev().take_while(|point| point.item.decision == last.item.decision).last()?;
+        Some((last.item.decision, since.days))
     }
 
     /// The number of sessions with a decision.
     pub fn count(&self, decision: Decision) -> usize {
-        self.points.iter().filter(|point| point.decision == decision).count()
+        self.points.iter().filter(|point| point.item.decision == decision).count()
     }
 }
 
@@ -89,16 +78,7 @@ impl MachineConformity {
     }
 
     fn add(&mut self, days: f64, item: &ConformityItem) {
-        let point = DecisionPoint {
-            days,
-            value: item.value,
-            u: item.u,
-            unit: item.unit.clone(),
-            lower: item.lower,
-            upper: item.upper,
-            decision: item.decision,
-            why: item.why.clone(),
-        };
+        let point = DecisionPoint { days, item: item.clone() };
         match self.items.iter_mut().find(|known| known.id == item.id) {
             Some(known) => known.points.push(point),
             None => self.items.push(ItemHistory { id: item.id.clone(), points: vec![point] }),

@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use abbe_apply::history::events::{ChangeEvent, Compensation, Kind};
 use abbe_apply::history::faults::{Fault, FoundEffect, faults};
-use abbe_apply::history::results::{Estimate, History, MachineHistory, ParameterHistory};
+use abbe_apply::history::results::{History, MachineHistory, ParameterHistory};
 use abbe_apply::history::{HistoryOptions, MachineSessions, SessionValues, analyse};
 use abbe_identify::results::validation::ValidationVerdict;
-use abbe_identify::results::{NextStep, Statements};
+use abbe_identify::results::{Estimate, MeasuredValue, NextStep, Statements};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -49,10 +49,10 @@ pub struct ChangedInHistory {
     pub id: String,
     /// Its drift, in `unit` a year; absent if it has shifted only.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub drift_per_year: Option<Estimate>,
+    pub drift_per_year: Option<MeasuredValue>,
     /// Its last such step, in `unit`; absent if it drifts only.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub shift: Option<Estimate>,
+    pub shift: Option<MeasuredValue>,
     /// Unit of the parameter.
     pub unit: String,
 }
@@ -69,7 +69,7 @@ pub fn statements(machines: &[MachineHistory]) -> HistoryStatements {
             Kind::Compensation | Kind::Correction => is_explained,
         };
         // The last step of this kind.
-        let shift_of = |one: &ParameterHistory| -> Option<Estimate> {
+        let shift_of = |one: &ParameterHistory| -> Option<MeasuredValue> {
             let is_own = |change: &&ChangeEvent| change.parameters.contains(&one.id) && is_wanted(change);
             machine.amount(machine.changes.iter().rfind(is_own)?, &one.id)
         };
@@ -98,7 +98,7 @@ pub fn statements(machines: &[MachineHistory]) -> HistoryStatements {
 
 /// Whether a change exceeds its standard uncertainty. Sessions that repeat each other to a fraction of it, such as computed ones,
 /// show changes that mean nothing.
-fn exceeds_u(change: &Estimate) -> bool {
+fn exceeds_u(change: &MeasuredValue) -> bool {
     change.value.abs() > change.u
 }
 
@@ -330,26 +330,24 @@ fn machine_sessions(machine_id: String, sessions: &[Dated]) -> MachineSessions {
     let mut parameters: Vec<(String, String, String)> = Vec::new();
     let mut place: HashMap<String, usize> = HashMap::new();
     for dated in sessions {
-        for (id, unit, meaning, ..) in dated.record.followed(by_base).values {
+        for Estimate { id, unit, meaning, .. } in dated.record.followed(by_base).0 {
             if is_of_machine(id) && !place.contains_key(id) {
-                place.insert(id.to_string(), parameters.len());
-                parameters.push((id.to_string(), unit.to_string(), meaning.to_string()));
+                place.insert(id.clone(), parameters.len());
+                parameters.push((id.clone(), unit.clone(), meaning.clone()));
             }
         }
     }
     let count = parameters.len();
     let values = sessions.iter().map(|dated| {
-        let record = &dated.record;
         let mut values = vec![None; count];
         let mut covariance = vec![vec![0.0; count]; count];
-        let followed = record.followed(by_base);
+        let (followed, matrix) = dated.record.followed(by_base);
         let known: Vec<(usize, usize)> =
-            (followed.values.iter().enumerate()).filter_map(|(own, (id, ..))| Some((own, *place.get(*id)?))).collect();
+            (followed.iter().enumerate()).filter_map(|(own, found)| Some((own, *place.get(&found.id)?))).collect();
         for (own, at) in &known {
-            let (.., value, u) = followed.values[*own];
-            values[*at] = Some((value, u));
+            values[*at] = Some((followed[*own].value, followed[*own].u));
             for (other, across) in &known {
-                covariance[*at][*across] = followed.covariance_of(*own, *other);
+                covariance[*at][*across] = matrix.get(*own).and_then(|row| row.get(*other)).copied().unwrap_or(0.0);
             }
         }
         SessionValues {
@@ -365,7 +363,7 @@ fn machine_sessions(machine_id: String, sessions: &[Dated]) -> MachineSessions {
     let (name, code) = machine.map_or((String::new(), String::new()), |machine| (machine.name, machine.code));
     let determined = last.map_or(0, |record| match &record.base {
         Some(base) => base.determined(),
-        None => record.followed(false).values.iter().filter(|(id, ..)| is_of_machine(id)).count(),
+        None => record.followed(false).0.iter().filter(|found| is_of_machine(&found.id)).count(),
     });
     let validation = last.and_then(|record| record.validation.as_ref()).map(|validation| validation.verdict);
     MachineSessions {
@@ -388,8 +386,8 @@ fn found_effects(dated: &Dated) -> impl Iterator<Item = FoundEffect> {
         session: dated.record.key.clone(),
         days: dated.days,
         id: effect.id.clone(),
-        family: (effect.family.clone(), effect.component.clone(), effect.driver.clone()),
-        meaning: effect.meaning.clone(),
+        family: (effect.family.clone(), effect.name.component.clone(), effect.name.driver.clone()),
+        meaning: effect.name.meaning.clone(),
         rms_gain_um: effect.rms_gain_um,
         aliases: effect.aliases.clone(),
     })

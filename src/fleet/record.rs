@@ -5,15 +5,12 @@ use std::collections::BTreeMap;
 use abbe_identify::IdentifyError;
 use abbe_identify::fit::Fit;
 use abbe_identify::fit::base::{Gauge, base_parameters};
-use abbe_identify::noise::NoiseSource;
+use abbe_identify::model_file::InputFile;
 use abbe_identify::numerics::solve::Svd;
-use abbe_identify::parameter_description::parameter_meaning;
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::validation::ValidationVerdict;
-use abbe_identify::results::{
-    Covariance, DeterminedBy, EffectName, GoodnessVerdict, ParameterResult, TraceVerdict, Unobservable,
-};
+use abbe_identify::results::{EffectName, Estimate, ModelResult, TraceVerdict};
 use abbe_identify::tolerance::Conformity;
 use faer::Mat;
 use schemars::JsonSchema;
@@ -22,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use super::options::Options;
 
 /// Version of the schema of records and of the tables that are made from them.
-pub const SCHEMA_VERSION: u32 = 2;
+pub const SCHEMA_VERSION: u32 = 3;
 
 /// The result of one session. It depends on the contents of the input files, the options and the build of the program
 /// alone.
@@ -49,39 +46,19 @@ pub struct Record {
     /// All notes of `[about]`.
     pub about: BTreeMap<String, String>,
     /// The input files: name relative to the folder of the session file, and SHA-256.
-    pub inputs: Vec<InputRecord>,
+    pub inputs: Vec<InputFile>,
     /// Why there is no result; `null` if there is one.
     pub error: Option<ErrorRecord>,
     /// Instrument: `ballbar`, `r-test`, …
     pub instrument: Option<String>,
-    /// Number of readings without outliers.
-    pub readings: Option<usize>,
-    /// Number of readings excluded as outliers.
-    pub outliers: Option<usize>,
-    /// Standard deviation of one scalar reading, µm.
-    pub noise_um: Option<f64>,
-    /// Source of `noise_um`: `stated`, `repeats` or `residual`.
-    pub noise_source: Option<NoiseSource>,
+    /// The final model, with the found effects if there was a trace; `null` if there is none.
+    pub model: Option<ModelResult>,
     /// Verdict of the trace; `null` without a trace.
     pub verdict: Option<TraceVerdict>,
-    /// Whether the residual of the final model agrees with the noise.
-    pub goodness: Option<GoodnessVerdict>,
     /// Rms of the residual of the declared model, µm.
     pub rms_before_um: Option<f64>,
-    /// Rms of the residual of the final model, µm: with the found effects if there was a trace.
-    pub rms_um: Option<f64>,
-    /// Rms of the residual over held-out readings of the final model, µm.
-    pub heldout_rms_um: Option<f64>,
-    /// Numerical rank of the final model.
-    pub rank: Option<usize>,
-    /// Number of parameters of the final model, set-up parameters included.
-    pub parameter_count: Option<usize>,
     /// Number of set-up conflicts.
     pub conflicts: Option<usize>,
-    /// The parameters of the final model: the identifiable ones in the order of `covariance`, then the others.
-    pub parameters: Vec<ParameterRecord>,
-    /// Covariance of the identifiable parameters: the lower triangle, row by row.
-    pub covariance: Vec<f64>,
     /// The base parameters of the machine, if the readings do not separate all of its parameters; `null` otherwise.
     #[serde(default)]
     pub base: Option<BaseRecord>,
@@ -107,15 +84,6 @@ pub struct MachineRecord {
     pub sha256: String,
 }
 
-/// An input file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct InputRecord {
-    /// Its name relative to the folder of the session file.
-    pub file: String,
-    /// SHA-256 of its contents, in hexadecimal; `null` if it cannot be read.
-    pub sha256: Option<String>,
-}
-
 /// Why a session has no result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ErrorRecord {
@@ -125,53 +93,15 @@ pub struct ErrorRecord {
     pub message: String,
 }
 
-/// A parameter of the final model.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct ParameterRecord {
-    /// Identifier: `EX0C`, `bar[A100]`, `EZC~C:h2.amplitude`.
-    pub id: String,
-    /// Estimate, in `unit`; `null` if it is not identifiable.
-    pub value: Option<f64>,
-    /// Standard uncertainty, in `unit`; `null` if the parameter is not identifiable.
-    pub u: Option<f64>,
-    /// Unit of `value` and `u`: `um`, `arcsec`, …
-    pub unit: Option<String>,
-    /// What the parameter is, in words.
-    pub meaning: Option<String>,
-    /// Whether the readings identify it.
-    pub identifiable: bool,
-    /// What determines the estimate.
-    pub determined_by: DeterminedBy,
-    /// Whether the estimate exceeds its expanded uncertainty and is quotable.
-    pub significant: bool,
-    /// Whether the estimate may be quoted with `u`: the readings determine it, and the model lacks no effect.
-    pub quotable: bool,
-}
-
 /// Base parameters of the machine: all that the readings determine of it, with other parameters held at nominal.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BaseRecord {
     /// The parameters that are held at nominal.
     pub held: Vec<String>,
     /// The base parameters.
-    pub parameters: Vec<BaseParameterRecord>,
-    /// Their covariance: the lower triangle, row by row.
-    pub covariance: Vec<f64>,
-}
-
-/// A base parameter.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct BaseParameterRecord {
-    /// Identifier.
-    pub id: String,
-    /// Estimate, in `unit`.
-    pub value: f64,
-    /// Standard uncertainty, in `unit`.
-    pub u: f64,
-    /// Unit of `value` and `u`.
-    pub unit: String,
-    /// What the parameter is, in words.
-    pub meaning: String,
+    pub parameters: Vec<Estimate>,
+    /// Their covariance, row by row.
+    pub covariance: Vec<Vec<f64>>,
 }
 
 impl BaseRecord {
@@ -191,61 +121,38 @@ impl BaseRecord {
         let list = &problem.parameters.list;
         let display = |j: usize| list[j].unit.display_per_internal;
         let of_machine = |j: &usize| list[*j].role != Role::Setup;
-        let kept: Vec<usize> = (0..list.len()).filter(|j| !base.held.contains(j)).filter(of_machine).collect();
         let covariance = |i: usize, j: usize| base.covariance[(i, j)] * display(i) * display(j);
-        let parameters = kept.iter().map(|j| BaseParameterRecord {
-            id: list[*j].id.clone(),
-            value: problem.parameters.value(*j, &base.beta) * display(*j),
-            u: covariance(*j, *j).max(0.0).sqrt(),
-            unit: list[*j].unit.name.clone(),
-            meaning: parameter_meaning(problem, *j, None),
-        });
-        let rows = kept.iter().enumerate();
+        // A parameter without uncertainty is held at nominal in a combination that the readings hardly determine.
+        let is_kept = |j: &usize| !base.held.contains(j) && of_machine(j) && covariance(*j, *j) > 0.0;
+        let kept: Vec<usize> = (0..list.len()).filter(is_kept).collect();
         Ok(Some(BaseRecord {
             held: base.held.iter().filter(|j| of_machine(j)).map(|j| list[*j].id.clone()).collect(),
-            parameters: parameters.collect(),
-            covariance: rows.flat_map(|(row, i)| kept[..=row].iter().map(|j| covariance(*i, *j))).collect(),
+            parameters: kept.iter().map(|j| base.estimate(problem, *j)).collect(),
+            covariance: kept.iter().map(|i| kept.iter().map(|j| covariance(*i, *j)).collect()).collect(),
         }))
     }
 
     /// Number of directions of the base parameters that the readings determine: the rank of their covariance. Along the others
     /// they are held at nominal.
     pub fn determined(&self) -> usize {
-        let known: Vec<usize> = (0..self.parameters.len()).filter(|own| self.parameters[*own].u > 0.0).collect();
-        let u = |own: usize| self.parameters[known[own]].u;
-        let correlation = Mat::from_fn(known.len(), known.len(), |a, b| {
-            self.covariance.get(in_triangle(known[a], known[b])).copied().unwrap_or(0.0) / (u(a) * u(b))
-        });
-        Svd::of(correlation.as_ref()).map_or(known.len(), |svd| svd.rank(HELD))
+        let count = self.covariance.len();
+        let u = |own: usize| self.covariance[own][own].sqrt();
+        let correlation = Mat::from_fn(count, count, |a, b| self.covariance[a][b] / (u(a) * u(b)));
+        Svd::of(correlation.as_ref()).map_or(count, |svd| svd.rank(HELD))
     }
 }
 
 /// Eigenvalue of a correlation, as a share of the largest, below which it is a rounding error.
 const HELD: f64 = 1e-11;
 
-/// Position of an entry in a lower triangle that is stored row by row.
-fn in_triangle(a: usize, b: usize) -> usize {
-    let (low, high) = (a.min(b), a.max(b));
-    high * (high + 1) / 2 + low
-}
-
 /// A found effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EffectRecord {
     /// Identifier: `EZC~C:h2`.
     pub id: String,
-    /// What moves.
-    pub component: String,
-    /// The quantity that the effect follows.
-    pub driver: String,
-    /// Shape of the dependence.
-    pub shape: String,
-    /// Order of a harmonic, degree of a polynomial.
-    pub order: Option<f64>,
-    /// The tests to which the effect is confined; empty for all tests.
-    pub tests: Vec<String>,
-    /// What the effect is, in words.
-    pub meaning: String,
+    /// Component, driver, shape, order.
+    #[serde(flatten)]
+    pub name: EffectName,
     /// Family of the effect in the library.
     pub family: String,
     /// Probability that the whole search finds as much in readings without structure.
@@ -256,22 +163,6 @@ pub struct EffectRecord {
     pub unique: bool,
     /// Identifiers of the effects that explain the readings equally well, nearest first.
     pub aliases: Vec<String>,
-}
-
-/// The parameters of a session that a history follows.
-pub struct Followed<'r> {
-    /// Identifier, unit, meaning, value and standard uncertainty.
-    pub values: Vec<(&'r str, &'r str, &'r str, f64, f64)>,
-    /// The place of each in the covariance.
-    places: Vec<usize>,
-    covariance: &'r [f64],
-}
-
-impl Followed<'_> {
-    /// Covariance of two of them by their positions in `values`.
-    pub fn covariance_of(&self, a: usize, b: usize) -> f64 {
-        self.covariance.get(in_triangle(self.places[a], self.places[b])).copied().unwrap_or(0.0)
-    }
 }
 
 /// The validation of the machine's model on the session.
@@ -287,101 +178,13 @@ pub struct ValidationRecord {
     pub moved: Vec<String>,
 }
 
-impl EffectRecord {
-    /// An effect with its aliases, by their identifiers.
-    pub fn new(id: String, result: &abbe_identify::results::EffectResult, aliases: Vec<String>) -> EffectRecord {
-        let EffectName { component, driver, shape, order, tests, meaning } = result.name.clone();
-        EffectRecord {
-            id,
-            component,
-            driver,
-            shape,
-            order,
-            tests,
-            meaning,
-            family: result.family.clone(),
-            p_value: result.p_value,
-            rms_gain_um: result.rms_gain_um,
-            unique: result.unique,
-            aliases,
-        }
-    }
-}
-
 impl Record {
-    /// Sets the parameters with their covariance. Parameters of a null-space direction that are not among the
-    /// identifiable ones have no value.
-    pub fn set_parameters(
-        &mut self,
-        parameters: &[ParameterResult],
-        covariance: &Covariance,
-        unobservable: &[Unobservable],
-    ) {
-        self.parameters = parameters
-            .iter()
-            .map(|parameter| ParameterRecord {
-                id: parameter.id.clone(),
-                value: Some(parameter.value),
-                u: Some(parameter.u),
-                unit: Some(parameter.unit.clone()),
-                meaning: Some(parameter.meaning.clone()),
-                identifiable: true,
-                determined_by: parameter.determined_by,
-                significant: parameter.significant,
-                quotable: parameter.quotable,
-            })
-            .collect();
-        let combinations = unobservable.iter().map(|direction| &direction.combination);
-        for (id, count) in combinations.flat_map(|combination| combination.keys().map(|id| (id, combination.len()))) {
-            if !self.parameters.iter().any(|known| known.id == *id) {
-                self.parameters.push(ParameterRecord {
-                    id: id.clone(),
-                    value: None,
-                    u: None,
-                    unit: None,
-                    meaning: None,
-                    identifiable: false,
-                    determined_by: if count == 1 { DeterminedBy::Nothing } else { DeterminedBy::BaseCombination },
-                    significant: false,
-                    quotable: false,
-                });
-            }
-        }
-        let lower = covariance.matrix.iter().enumerate().flat_map(|(row, entries)| entries.iter().take(row + 1));
-        self.covariance = lower.copied().collect();
-    }
-
-    /// The parameters of the machine with their values, and those held at nominal: the base parameters if the readings do
-    /// not separate all, else the identifiable ones.
-    pub fn followed(&self, by_base: bool) -> Followed<'_> {
-        match self.base.as_ref().filter(|_| by_base) {
-            Some(base) => {
-                // A parameter without uncertainty is held at nominal in a combination that the readings hardly determine.
-                let known = base.parameters.iter().enumerate().filter(|(_, own)| own.u > 0.0);
-                let (places, values) =
-                    known.map(|(place, own)| (place, (&*own.id, &*own.unit, &*own.meaning, own.value, own.u))).unzip();
-                Followed { values, places, covariance: &base.covariance }
-            }
-            None => {
-                let known = self.parameters.iter().enumerate().filter(|(_, own)| own.identifiable);
-                let known: Vec<(usize, &ParameterRecord)> = known.filter(|(_, own)| own.value.is_some()).collect();
-                let value = |own: &ParameterRecord| own.value.zip(own.u).unwrap_or_default();
-                Followed {
-                    values: (known.iter())
-                        .map(|(_, own)| {
-                            (
-                                &*own.id,
-                                own.unit.as_deref().unwrap_or_default(),
-                                own.meaning.as_deref().unwrap_or_default(),
-                                value(own).0,
-                                value(own).1,
-                            )
-                        })
-                        .collect(),
-                    places: known.iter().map(|(place, _)| *place).collect(),
-                    covariance: &self.covariance,
-                }
-            }
+    /// The parameters that a history follows, and their covariance: the base parameters, or those of the final model.
+    pub fn followed(&self, by_base: bool) -> (&[Estimate], &[Vec<f64>]) {
+        match (&self.base, &self.model) {
+            (Some(base), _) if by_base => (&base.parameters, &base.covariance),
+            (_, Some(model)) => (&model.parameters, &model.covariance.matrix),
+            _ => (&[], &[]),
         }
     }
 }
@@ -390,23 +193,10 @@ impl Record {
 mod tests {
     use super::*;
 
-    /// Two parameters of which the readings determine the sum, one that they determine, and one that they do not: two directions.
+    /// Two parameters of which the readings determine the sum, and one that they determine: two directions.
     #[test]
     fn directions_held_at_nominal_are_not_determined() {
-        let known = [("a", 1.0), ("b", 1.0), ("c", 0.5), ("d", 0.0)];
-        let parameters = known.map(|(id, u)| BaseParameterRecord {
-            id: id.into(),
-            value: 0.0,
-            u,
-            unit: "um".into(),
-            meaning: String::new(),
-        });
-        let covariance = vec![1.0, 1.0, 1.0, 0.0, 0.0, 0.25, 0.0, 0.0, 0.0, 0.0];
-        let base = BaseRecord { held: Vec::new(), parameters: parameters.to_vec(), covariance };
-        assert_eq!(base.determined(), 2);
-        let record = Record { base: Some(base), ..Record::default() };
-        let followed = record.followed(true);
-        assert_eq!(followed.values.iter().map(|(id, ..)| *id).collect::<Vec<_>>(), ["a", "b", "c"]);
-        assert_eq!((followed.covariance_of(0, 1), followed.covariance_of(2, 2)), (1.0, 0.25));
+        let covariance = vec![vec![1.0, 1.0, 0.0], vec![1.0, 1.0, 0.0], vec![0.0, 0.0, 0.25]];
+        assert_eq!(BaseRecord { covariance, ..BaseRecord::default() }.determined(), 2);
     }
 }

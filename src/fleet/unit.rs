@@ -10,8 +10,7 @@ use std::path::{Path, PathBuf};
 use abbe_files::stamp::FileStamp;
 use abbe_files::{ReadOptions, Source, SourceMap};
 use abbe_identify::IdentifyError;
-use abbe_identify::model_file;
-use abbe_identify::results::{FitResult, ModelResult, TraceResult};
+use abbe_identify::model_file::{self, InputFile};
 use abbe_model::document::{of_domain, print};
 use abbe_model::session::Session;
 use abbe_trace::SessionFit;
@@ -20,9 +19,7 @@ use abbe_trace::{Progress, TraceOptions, trace};
 use sha2::{Digest, Sha256};
 
 use super::options::Options;
-use super::record::{
-    BaseRecord, EffectRecord, ErrorRecord, InputRecord, MachineRecord, Record, SCHEMA_VERSION, ValidationRecord,
-};
+use super::record::{BaseRecord, EffectRecord, ErrorRecord, MachineRecord, Record, SCHEMA_VERSION, ValidationRecord};
 use super::store::{IfClaimed, Pointer, Search, Store, found_or_claimed};
 use super::{BUILD, FleetError};
 
@@ -129,7 +126,7 @@ fn inputs(file: &Path, options: &Options, places: &Places) -> Inputs {
     } else {
         // A session that cannot be read is known by its own text and by what is wrong with it, so that a change of
         // another file is noticed.
-        record.inputs = vec![InputRecord { file: name_of(file), sha256 }];
+        record.inputs = vec![InputFile { file: name_of(file), sha256 }];
     }
     let stated = serde_json::json!({
         "schema_version": SCHEMA_VERSION,
@@ -151,11 +148,11 @@ fn name_of(file: &Path) -> String {
 }
 
 /// The files of a session with their checksums, by names that do not depend on where the folder lies.
-fn input_records(sources: &SourceMap) -> Vec<InputRecord> {
+fn input_records(sources: &SourceMap) -> Vec<InputFile> {
     let folder = sources.file.parent().unwrap_or(Path::new(""));
     let record = |stamp: &FileStamp| {
         let name = stamp.file.strip_prefix(folder).map(|name| name.display().to_string());
-        InputRecord { file: name.unwrap_or_else(|_| name_of(&stamp.file)), sha256: stamp.sha256() }
+        InputFile { file: name.unwrap_or_else(|_| name_of(&stamp.file)), sha256: stamp.sha256() }
     };
     sources.files.iter().map(record).collect()
 }
@@ -229,8 +226,8 @@ fn record(inputs: Inputs, should_continue: &(dyn Fn() -> bool + Sync)) -> Result
                 record.validation = Some(ValidationRecord {
                     model_sha256: sha256.unwrap_or_default(),
                     verdict: result.verdict,
-                    rms_um: result.model.rms.rms_um,
-                    moved: result.moved.into_iter().map(|moved| moved.id).collect(),
+                    rms_um: result.model.residual.rms.rms_um,
+                    moved: result.moved.into_iter().map(|moved| moved.change.id).collect(),
                 });
                 record.warnings.extend(result.warnings);
             }
@@ -252,8 +249,12 @@ fn identify(
 ) -> Result<(), IdentifyError> {
     if record.options.no_trace {
         let found = SessionFit::of(session, record.seed)?;
-        set_fit(record, &found.result);
         record.base = BaseRecord::of(&found.problem, &found.fit)?;
+        record.rms_before_um = Some(found.result.model.fit.rms_um);
+        record.conflicts = Some(found.result.plausibility.conflicts.len());
+        record.conformity = found.result.conformity;
+        record.warnings = found.result.warnings;
+        record.model = Some(found.result.model);
         return Ok(());
     }
     let options = TraceOptions {
@@ -269,41 +270,22 @@ fn identify(
         .iter()
         .zip(&found.alias_effects)
         .zip(&found.result.effects)
-        .map(|((effect, aliases), result)| {
-            EffectRecord::new(effect.id(), result, aliases.iter().map(abbe_model::effect::Effect::id).collect())
+        .map(|((effect, aliases), result)| EffectRecord {
+            id: effect.id(),
+            name: result.name.clone(),
+            family: result.family.clone(),
+            p_value: result.p_value,
+            rms_gain_um: result.rms_gain_um,
+            unique: result.unique,
+            aliases: aliases.iter().map(abbe_model::effect::Effect::id).collect(),
         })
         .collect();
-    set_trace(record, &found.result);
     record.base = BaseRecord::of(&found.after, &found.after_fit)?;
+    record.verdict = Some(found.result.verdict);
+    record.rms_before_um = Some(found.result.before.fit.rms_um);
+    record.conflicts = Some(found.result.plausibility.conflicts.len());
+    record.conformity = found.result.conformity;
+    record.warnings = found.result.warnings;
+    record.model = Some(found.result.after);
     Ok(())
-}
-
-fn set_fit(record: &mut Record, fit: &FitResult) {
-    record.rms_before_um = Some(fit.model.rms_um);
-    record.conflicts = Some(fit.plausibility.conflicts.len());
-    record.conformity.clone_from(&fit.conformity);
-    record.warnings.clone_from(&fit.warnings);
-    set_model(record, &fit.model);
-}
-
-fn set_trace(record: &mut Record, trace: &TraceResult) {
-    record.verdict = Some(trace.verdict);
-    record.rms_before_um = Some(trace.before.rms_um);
-    record.conflicts = Some(trace.plausibility.conflicts.len());
-    record.conformity.clone_from(&trace.conformity);
-    record.warnings.clone_from(&trace.warnings);
-    set_model(record, &trace.after);
-}
-
-fn set_model(record: &mut Record, model: &ModelResult) {
-    record.readings = Some(model.readings);
-    record.outliers = Some(model.outliers.len());
-    record.noise_um = Some(model.noise_um);
-    record.noise_source = Some(model.noise_source);
-    record.goodness = Some(model.outcome.goodness.verdict);
-    record.rms_um = Some(model.rms_um);
-    record.heldout_rms_um = Some(model.heldout_rms_um);
-    record.rank = Some(model.rank);
-    record.parameter_count = Some(model.parameter_count);
-    record.set_parameters(&model.parameters, &model.covariance, &model.unobservable);
 }

@@ -2,12 +2,12 @@
 
 use abbe::apply::compare::results::{Comparison, Difference, Pair};
 use abbe::document::StatedComparison;
-use abbe::identify::results::Outlier;
+use abbe::identify::results::{MeasuredValue, Outlier, ParameterChange};
 use abbe::model::words::counted;
 
 use super::block::{Report, Text};
 use super::commands::Commands;
-use super::figure::bars::{Row, Value, Values};
+use super::figure::bars::{Row, Values};
 use super::figure::{Chart, Figure, Quantity};
 use super::number::{p_equals, probability, quantity, unit, units, value_and_u};
 use super::statements;
@@ -92,16 +92,17 @@ fn remarks(comparison: &Comparison, pair: &Pair) -> Vec<String> {
         lines.push(format!("one object in both: {}", pair.shared_setup.join(", ")));
     }
     let others: Vec<&str> =
-        pair.not_shared.iter().filter(|other| !other.refuted).map(|other| other.id.as_str()).collect();
+        pair.not_shared.iter().filter(|other| !other.refuted).map(|other| other.change.id.as_str()).collect();
     if !others.is_empty() {
         lines.push(format!("not taken for one object, like the others of their kind: {}", others.join(", ")));
     }
     for refuted in pair.not_shared.iter().filter(|other| other.refuted) {
-        let (value, u) = value_and_u(refuted.value, refuted.u);
+        let change = &refuted.change;
+        let (value, u) = value_and_u(change.value, change.u);
         lines.push(format!(
             "not one object in both, although of one name: {} differs by {} ({})",
-            refuted.id,
-            quantity(&format!("{value} ± {u}"), &refuted.unit),
+            change.id,
+            quantity(&format!("{value} ± {u}"), &change.unit),
             p_equals(refuted.p_value)
         ));
     }
@@ -129,19 +130,22 @@ fn differences(comparison: &Comparison, pair: &Pair) -> Table {
             true => "",
             false => "not judged",
         };
-        let [value, u] = Cell::estimate(d.value, d.u);
-        cells![d.id.clone(), value, u, unit(&d.unit), probability(d.p_value), verdict]
+        let ParameterChange { id, value, u, unit: name } = &d.change;
+        let [value, u] = Cell::estimate(*value, *u);
+        cells![id.clone(), value, u, unit(name), probability(d.p_value), verdict]
     });
     Table::new(["difference", ">value", ">u", "", ">p", ""], rows).folded(pair.significant + FOLDED)
 }
 
 /// The differences with error bars, one figure for each unit.
 fn figures(comparison: &Comparison, pair: &Pair) -> Vec<Figure> {
-    let names = units(own(comparison, pair).map(|d| d.unit.as_str())).into_iter();
+    let names = units(own(comparison, pair).map(|d| d.change.unit.as_str())).into_iter();
     let figure = |name: &str| {
-        let of_unit = own(comparison, pair).filter(|d| d.unit == name).take(MAX_ROWS);
-        let row =
-            |d: &Difference| Row { name: d.id.clone(), before: None, after: Some(Value { value: d.value, u: d.u }) };
+        let of_unit = own(comparison, pair).map(|d| &d.change).filter(|change| change.unit == name).take(MAX_ROWS);
+        let row = |change: &ParameterChange| {
+            let after = Some(MeasuredValue { value: change.value, u: change.u });
+            Row { name: change.id.clone(), before: None, after }
+        };
         let quantity = Quantity::new("difference", name);
         let labels = ["", "difference"].map(str::to_string);
         Figure::new(
@@ -178,10 +182,10 @@ fn values(comparison: &Comparison) -> Table {
         cells![
             d.from.clone(),
             d.to.clone(),
-            d.id.clone(),
-            Cell::exact(d.value),
-            Cell::exact(d.u),
-            d.unit.clone(),
+            d.change.id.clone(),
+            Cell::exact(d.change.value),
+            Cell::exact(d.change.u),
+            d.change.unit.clone(),
             Cell::exact(d.p_value),
             d.significant.to_string()
         ]

@@ -57,7 +57,7 @@ pub fn section(report: &mut Report, model: &ModelResult) {
             report.headed(Level::Key, heading, Text::List(sentences(&found)));
         }
     }
-    report.key(self::outliers(outliers, model.reading_unit));
+    report.key(self::outliers(outliers, model.noise.unit));
 }
 
 /// The readings that are excluded as outliers; without `--all`, those with the largest residual.

@@ -43,7 +43,7 @@ pub fn figures(model: &ModelResult) -> Vec<HeldOutFigure> {
         ("left-out test", found.left_out_test_rms_um, found.left_out_test_rms_3d_um),
     ];
     let present = all.into_iter().filter_map(|(name, rms_um, rms_3d_um)| {
-        Some(HeldOutFigure { name, unit: model.reading_unit, rms_um: rms_um?, rms_3d_um })
+        Some(HeldOutFigure { name, unit: model.noise.unit, rms_um: rms_um?, rms_3d_um })
     });
     present.collect()
 }

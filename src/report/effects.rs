@@ -55,14 +55,13 @@ pub fn section(report: &mut Report, trace: &TraceOutcome) {
 fn values(effect: &EffectResult, screened: &str, is_alone: bool) -> Table {
     let mut rows = vec![cells!["estimate", estimate(effect)]];
     rows.extend(effect.prior.iter().map(|prior| cells!["prior", present::prior(prior)]));
-    let explains =
-        format!("{} rms ({})", of_readings(effect.rms_gain_um, effect.reading_unit), p_value(effect.p_value));
+    let explains = format!("{} rms ({})", of_readings(effect.rms_gain_um, effect.unit), p_value(effect.p_value));
     rows.push(cells!["explains", explains]);
     // Of a single effect it stands among the key figures.
     if !is_alone {
         rows.push(cells![
             "held-out rms",
-            format!("{} with this effect", of_readings(effect.heldout_rms_um, effect.reading_unit))
+            format!("{} with this effect", of_readings(effect.heldout_rms_um, effect.unit))
         ]);
     }
     rows.push(cells!["family", &effect.family]);
@@ -145,7 +144,7 @@ fn explanations(effect: &EffectResult) -> Table {
                outcomes: Vec<String>| {
         let mut row =
             cells![format!("{}{} ({})", name_of.meaning, uniqueness::also(variants), name(name_of)), likelihood];
-        row.extend(predicts.then(|| Cell::or_dash(predicted.map(|um| of_readings(um, effect.reading_unit).into()))));
+        row.extend(predicts.then(|| Cell::or_dash(predicted.map(|um| of_readings(um, effect.unit).into()))));
         row.extend(outcomes.into_iter().map(Cell::from));
         row
     };
@@ -213,22 +212,22 @@ fn curve(effect: &EffectResult) -> Figure {
 
 /// Held-out error after each addition of the search.
 fn convergence(trace: &TraceOutcome) -> Figure {
-    let (before, unit) = (trace.result.before.heldout_rms_um, trace.result.reading_unit);
+    let (before, unit) = (trace.result.before.fit.heldout_rms_um, trace.result.reading_unit);
     let mut points = vec![(0.0, before)];
-    points.extend(trace.steps.iter().enumerate().map(|(k, step)| (k as f64 + 1.0, step.heldout_rms_um)));
+    points.extend(trace.steps.iter().enumerate().map(|(k, step)| (k as f64 + 1.0, step.heldout_um)));
     let maximum = points.iter().map(|p| p.1).fold(0.0, f64::max);
     let steps = trace.steps.len() as f64;
     let shown = trace.steps.len() <= MAX_NAMED;
     let names = trace.steps.iter().map(|step| Name {
         text: step.id.clone(),
-        note: format!("{}, {}", of_readings(step.heldout_rms_um, unit), counted(step.effects, "effect")),
+        note: format!("{}, {}", of_readings(step.heldout_um, unit), counted(step.effects, "effect")),
         shown,
     });
     // Names need space to the right of the last point.
     let x = Scale::over([0.0, if shown { 1.5 * steps } else { steps + 0.5 }], 10);
     let mut series =
         vec![Series { names: names.collect(), ..Series::new("held-out rms", "after", Mark::Line, points) }];
-    let noise = trace.result.after.noise_um;
+    let noise = trace.result.after.noise.value;
     if noise < maximum {
         let level = x.values.map(|at| (at, noise)).to_vec();
         series.push(Series::new("noise of a reading", "found-line", Mark::Line, level));

@@ -5,7 +5,7 @@ use abbe::identify::IdentifyError;
 use abbe::identify::circular::CircularTest;
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
-use abbe::identify::results::{FitMonteCarlo, FitResult, ModelResult, NextStep, ParameterResult, Verdict};
+use abbe::identify::results::{Estimate, FitMonteCarlo, FitResult, ModelResult, NextStep, Verdict};
 use abbe::identify::series::{spectrum, views};
 use abbe::identify::statements::has_candidates;
 use abbe::identify::tolerance::Conformity;
@@ -42,7 +42,7 @@ pub fn report(
     report.method = method(model);
     let opening = statements::opening(statements, &problem.session, model.degrees_of_freedom, commands);
     let noise = quality::noise_of_model(model);
-    let extent = format!("{}, {noise}; {}.", counted(model.readings, "reading"), rank(model));
+    let extent = format!("{}, {noise}; {}.", counted(model.fit.readings, "reading"), rank(model));
     let failed = conformity::failed(result.conformity.as_ref());
     let contradicted = plausibility::headline(&result.plausibility);
     report
@@ -155,7 +155,7 @@ fn propagations(drawn: &FitMonteCarlo, is_setup: impl Fn(&str) -> bool) -> Table
         let [low, high] = [quoted.low, quoted.high].map(|end| fixed(end, places(parameter.u)));
         cells![&parameter.id, value, gum_u, u, format!("{low} to {high}"), unit(&parameter.unit), source]
     });
-    let interval = numbers(format!("{} %", drawn.coverage_probability * 100.0));
+    let interval = numbers(format!("{} %", drawn.draws.coverage * 100.0));
     let mut columns = ["parameter", ">value", ">u GUM", ">u MC", "unit", "quoted"].map(Column::from).to_vec();
     columns.insert(4, interval);
     Table { key_rows: Some(key_rows), ..Table::new(columns, rows) }
@@ -167,8 +167,8 @@ fn agreement_of_propagations(drawn: &FitMonteCarlo) -> String {
     let count = |verdict: Verdict| drawn.parameters.iter().filter(|p| p.verdict == verdict).count();
     format!(
         "Monte Carlo, {}, seed {}: {} of {} agree with the GUM within the tolerance of JCGM 101, 8.1; {} differ",
-        counted(drawn.runs, "run"),
-        drawn.seed,
+        counted(drawn.draws.runs, "run"),
+        drawn.draws.seed,
         count(Verdict::Agree),
         counted(drawn.parameters.len(), "parameter"),
         count(Verdict::Differ)
@@ -203,8 +203,8 @@ impl Figures {
 
     /// The residual, the deciding held-out error, and those by what is held out.
     pub fn residual(&mut self, section: &str, model: &ModelResult) {
-        self.figure(section, "rms", "", model.rms_um, model.reading_unit.name());
-        self.figure(section, "held out", "", model.heldout_rms_um, model.reading_unit.name());
+        self.figure(section, "rms", "", model.fit.rms_um, model.noise.unit.name());
+        self.figure(section, "held out", "", model.fit.heldout_rms_um, model.noise.unit.name());
         for figure in cross_validation::figures(model) {
             self.figure(section, figure.name, "", figure.rms_um, figure.unit.name());
         }
@@ -232,7 +232,7 @@ impl Figures {
     }
 
     /// Parameters with their uncertainties.
-    pub fn parameters(&mut self, section: &str, parameters: &[ParameterResult]) {
+    pub fn parameters(&mut self, section: &str, parameters: &[Estimate]) {
         self.0.rows.extend(
             parameters
                 .iter()

@@ -1,11 +1,12 @@
 //! The machines of a fleet over time.
 
 use abbe::apply::history::chart::{EWMA_LIMIT, SHEWHART_LIMIT};
-use abbe::apply::history::events::{ChangeEvent, Kind, ParameterChange};
-use abbe::apply::history::results::{Due, Estimate, MachineHistory, ParameterHistory};
+use abbe::apply::history::events::{ChangeEvent, Kind};
+use abbe::apply::history::results::{Due, MachineHistory, ParameterHistory};
 use abbe::document::StatedHistory;
-use abbe::fleet::conformity::{ItemHistory, MachineConformity};
+use abbe::fleet::conformity::{DecisionPoint, ItemHistory, MachineConformity};
 use abbe::fleet::history::{FleetHistory, HistoryStatements, NotUsed};
+use abbe::identify::results::{MeasuredValue, ParameterChange};
 use abbe::identify::tolerance::rule::Decision;
 use abbe::model::calendar::date;
 use abbe::model::words::{counted, first_of};
@@ -105,23 +106,20 @@ fn values(machines: &[MachineHistory]) -> Table {
             let day = days.map_or(String::new(), date);
             cells![machine.machine_id.clone(), one.id.clone(), quantity, day, Cell::exact(value), u, unit]
         };
-        let term = |quantity, days, value: Estimate| row(quantity, days, value.value, Some(value.u), &one.unit);
+        let term = |quantity, days, value: MeasuredValue| row(quantity, days, value.value, Some(value.u), &one.unit);
         let drift = one
             .drift_per_year
             .map(|drift| row("drift", None, drift.value, Some(drift.u), &format!("{}/year", one.unit)));
-        let steps = one
-            .steps
-            .iter()
-            .map(|step| term("step", Some(step.before_days), Estimate { value: step.value, u: step.u }));
+        let steps = one.steps.iter().map(|step| term("step", Some(step.before_days), step.change));
         let sessions = one
             .points
             .iter()
-            .map(|point| term("session", Some(point.days), Estimate { value: point.value, u: point.u }));
+            .map(|point| term("session", Some(point.days), MeasuredValue { value: point.value, u: point.u }));
         let mut rows: Vec<Vec<Cell>> =
             one.level.map(|level| term("level", None, level)).into_iter().chain(drift).collect();
         rows.extend(steps.chain(sessions));
         rows.extend(
-            [("p-value", one.p_value), ("scatter", one.scatter_ratio), ("enlargement of u", one.u_enlargement)]
+            [("p-value", one.p_value), ("scatter", one.scatter_ratio), ("enlargement of u", one.enlargement)]
                 .map(|(quantity, value)| row(quantity, None, value, None, "1")),
         );
         rows.extend(
@@ -299,7 +297,7 @@ fn conformity(machines: &[MachineConformity]) -> Table {
     latest.sort_by_key(|(.., decision, _)| urgency(*decision));
     let rows = latest.into_iter().map(|(machine, item, decision, since)| {
         let last = item.points.last();
-        let [value, u] = match last.and_then(|point| point.value.zip(point.u)) {
+        let [value, u] = match last.and_then(|point| point.item.value.zip(point.item.u)) {
             Some((value, u)) => Cell::estimate(value, u),
             None => ["–".into(), "–".into()],
         };
@@ -308,7 +306,7 @@ fn conformity(machines: &[MachineConformity]) -> Table {
             item.id.clone(),
             value,
             u,
-            last.map_or_else(String::new, |point| unit(&point.unit)),
+            last.map_or_else(String::new, |point| unit(&point.item.unit)),
             decision.word(),
             date(since),
             item.count(Decision::Pass).to_string(),
@@ -323,20 +321,20 @@ fn conformity(machines: &[MachineConformity]) -> Table {
 /// The decisions about one machine, session by session.
 fn decisions(machine: &MachineConformity) -> Table {
     let rows = machine.items.iter().flat_map(|item| item.points.iter().map(move |point| (item, point)));
-    let rows = rows.map(|(item, point)| {
-        let [value, u] = match point.value.zip(point.u) {
+    let rows = rows.map(|(item, DecisionPoint { days, item: decided })| {
+        let [value, u] = match decided.value.zip(decided.u) {
             Some((value, u)) => Cell::estimate(value, u),
             None => ["–".into(), "–".into()],
         };
         cells![
             item.id.clone(),
-            date(point.days),
+            date(*days),
             value,
             u,
-            unit(&point.unit),
-            limits(point.lower, point.upper),
-            point.decision.word(),
-            point.why.clone().unwrap_or_default()
+            unit(&decided.unit),
+            limits(decided.lower, decided.upper),
+            decided.decision.word(),
+            decided.why.clone().unwrap_or_default()
         ]
     });
     Table::new(["quantity", "session", ">value", ">u", "", "limits", "decision", "why"], rows.collect::<Vec<_>>())

@@ -2,11 +2,11 @@
 
 use abbe::apply::geometric::{Comparison, ComparisonRow};
 use abbe::identify::problem::Problem;
-use abbe::identify::unit::ReadingUnit;
+use abbe::identify::results::MeasuredValue;
 use abbe::model::words::counted;
 
 use super::block::Report;
-use super::figure::bars::{Row, Value, Values};
+use super::figure::bars::{Row, Values};
 use super::figure::{Chart, Figure, Quantity};
 use super::fit::Figures;
 use super::number::{micrometres, unit, units};
@@ -24,7 +24,7 @@ pub fn report(problem: &Problem, result: &Comparison) -> Report {
          methods are applied to noise-free readings that are simulated with the errors of the full fit; these errors \
          are subtracted.",
         result.method,
-        noise_sentence(result.noise_um, ReadingUnit::Micrometre, result.noise_source)
+        noise_sentence(result.noise)
     );
     report.values = values(result);
     report.opening(
@@ -36,11 +36,7 @@ pub fn report(problem: &Problem, result: &Comparison) -> Report {
                 change(result),
                 micrometres(result.rms_um)
             ),
-            format!(
-                "{}, {}.",
-                counted(result.readings, "reading"),
-                noise(result.noise_um, ReadingUnit::Micrometre, result.noise_source)
-            ),
+            format!("{}, {}.", counted(result.readings, "reading"), noise(result.noise)),
         ],
     );
     report.section("Errors by both methods");
@@ -90,7 +86,7 @@ fn values(result: &Comparison) -> Table {
 }
 
 fn figures(result: &Comparison) -> Vec<Figure> {
-    let value = |value: Option<f64>, u: Option<f64>| Some(Value { value: value?, u: u? });
+    let value = |value: Option<f64>, u: Option<f64>| Some(MeasuredValue { value: value?, u: u? });
     let figure = |name: &str| {
         let own = result.errors.iter().filter(|row| row.unit == name);
         let rows = own.map(|row| Row {
@@ -155,7 +151,7 @@ fn centres(result: &Comparison) -> Table {
 
 #[cfg(test)]
 mod tests {
-    use abbe::identify::noise::NoiseSource;
+    use abbe::identify::noise::{NoiseSource, ReadingNoise};
 
     use super::*;
 
@@ -166,8 +162,7 @@ mod tests {
             change(&Comparison {
                 method: "circle".to_string(),
                 readings: 100,
-                noise_um: 0.3,
-                noise_source: NoiseSource::Stated,
+                noise: ReadingNoise { value: 0.3, source: NoiseSource::Stated, ..ReadingNoise::default() },
                 rms_um: 0.3,
                 method_rms_um,
                 nominal_rms_um,

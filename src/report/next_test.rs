@@ -2,7 +2,6 @@
 
 use abbe::identify::problem::Problem;
 use abbe::identify::results::Interval;
-use abbe::identify::unit::ReadingUnit;
 use abbe::model::words::{counted, listed};
 use abbe::plan::improve::Improvement;
 use abbe::plan::next_test::NextTest;
@@ -31,7 +30,7 @@ pub fn report(problem: &Problem, found: &NextTest) -> Report {
         Some(found) => verdict(found),
         None => format!("Minimum sweep range of {}.", counted(ranges.len(), "test")),
     };
-    let noise = noise(found.noise_um, ReadingUnit::Micrometre, found.noise_source);
+    let noise = noise(found.noise);
     let bound = improvement.as_ref().and_then(|found| {
         let last = found.steps.last()?;
         Some(efficiency(last.after, found.bound?, "as many of these tests"))

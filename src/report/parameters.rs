@@ -4,11 +4,11 @@ use abbe::identify::fit::Fit;
 use abbe::identify::parameters::{Parameter, Role};
 use abbe::identify::plausibility::{Pull, Pulls};
 use abbe::identify::problem::Problem;
-use abbe::identify::results::{DeterminedBy, Goodness, ParameterResult};
+use abbe::identify::results::{DeterminedBy, Estimate, Goodness, MeasuredValue};
 use abbe::model::words::counted;
 
 use super::block::{Report, Text};
-use super::figure::bars::{Row, Value, Values};
+use super::figure::bars::{Row, Values};
 use super::figure::{Chart, Figure, Quantity};
 use super::number::{places, unit, units, value_and_u};
 use super::quality::reservation;
@@ -25,19 +25,18 @@ pub const PRIOR: &str = "†";
 /// The parameters of a fit.
 pub struct Estimates<'r> {
     /// Errors and coefficients of effects.
-    pub errors: Vec<&'r ParameterResult>,
+    pub errors: Vec<&'r Estimate>,
     /// Set-up parameters.
-    pub setup: Vec<&'r ParameterResult>,
+    pub setup: Vec<&'r Estimate>,
     /// Pulls of set-up parameters, by their identifiers.
     pulls: Vec<(&'r str, Pull)>,
 }
 
 impl<'r> Estimates<'r> {
     /// Of the results of a fit.
-    pub fn new(problem: &'r Problem, fit: &Fit, parameters: &'r [ParameterResult]) -> Estimates<'r> {
+    pub fn new(problem: &'r Problem, fit: &Fit, parameters: &'r [Estimate]) -> Estimates<'r> {
         let list = &problem.parameters.list;
-        let is_setup =
-            |result: &&ParameterResult| list.iter().any(|p: &Parameter| p.role == Role::Setup && p.id == result.id);
+        let is_setup = |result: &&Estimate| list.iter().any(|p: &Parameter| p.role == Role::Setup && p.id == result.id);
         let (setup, errors) = parameters.iter().partition(is_setup);
         let pulls = Pulls::of(problem, fit).each.into_iter();
         Estimates { errors, setup, pulls: pulls.map(|pull| (list[pull.parameter].id.as_str(), pull)).collect() }
@@ -49,7 +48,7 @@ impl<'r> Estimates<'r> {
     }
 
     /// The table of the errors; without `--all`, the most significant ones.
-    pub fn table(&self, before: Option<&[ParameterResult]>) -> Table {
+    pub fn table(&self, before: Option<&[Estimate]>) -> Table {
         let ratio = |k: &usize| {
             let p = self.errors[*k];
             if p.u > 0.0 { (p.value / p.u).abs() } else { f64::INFINITY }
@@ -66,7 +65,7 @@ impl<'r> Estimates<'r> {
     }
 
     /// The table of the errors, and their figures.
-    pub fn errors(&self, report: &mut Report, goodness: Goodness, before: Option<&[ParameterResult]>) {
+    pub fn errors(&self, report: &mut Report, goodness: Goodness, before: Option<&[Estimate]>) {
         if self.errors.is_empty() {
             report.key("No error is identifiable.");
         }
@@ -78,7 +77,7 @@ impl<'r> Estimates<'r> {
     }
 
     /// The set-up parameters, in one line or with their table and figures.
-    pub fn set_up(&self, report: &mut Report, before: Option<&[ParameterResult]>) {
+    pub fn set_up(&self, report: &mut Report, before: Option<&[Estimate]>) {
         if self.setup.is_empty() {
             return;
         }
@@ -89,7 +88,7 @@ impl<'r> Estimates<'r> {
     }
 
     /// The set-up parameters as deviations from their stated values; `before`, the estimates of another model.
-    pub fn setup_table(&self, before: Option<&[ParameterResult]>) -> Table {
+    pub fn setup_table(&self, before: Option<&[Estimate]>) -> Table {
         let rows = self.setup.iter().map(|p| {
             let [value, u] = Cell::estimate(p.value, p.u);
             let pull = self.pulls.iter().find(|(id, _)| *id == p.id);
@@ -114,7 +113,7 @@ impl<'r> Estimates<'r> {
 }
 
 /// Parameters with u, U, significance and meaning; `before`, the estimates of another model.
-pub fn table(parameters: &[&ParameterResult], before: Option<&[ParameterResult]>) -> Table {
+pub fn table(parameters: &[&Estimate], before: Option<&[Estimate]>) -> Table {
     let rows = parameters.iter().map(|p| {
         let [value, u] = Cell::estimate(p.value, p.u);
         // Rounded to the same place.
@@ -132,7 +131,7 @@ pub fn table(parameters: &[&ParameterResult], before: Option<&[ParameterResult]>
     if parameters.iter().any(|p| !p.enlarged_by.is_empty()) {
         let without = parameters.iter().map(|p| p.u_without_aliases.map_or("".into(), |u| Cell::fixed(u, places(u))));
         table.push(">u without aliases", without);
-        let by = |p: &&ParameterResult| {
+        let by = |p: &&Estimate| {
             let aliases: Vec<&str> = p.enlarged_by.iter().map(|by| by.alias.as_str()).collect();
             Cell::from(aliases.join(", "))
         };
@@ -153,7 +152,7 @@ pub fn table(parameters: &[&ParameterResult], before: Option<&[ParameterResult]>
 }
 
 /// The table with a column of the same parameters in another model, in front of their meaning.
-fn beside(mut table: Table, parameters: &[&ParameterResult], before: Option<&[ParameterResult]>) -> Table {
+fn beside(mut table: Table, parameters: &[&Estimate], before: Option<&[Estimate]>) -> Table {
     let Some(before) = before else {
         return table;
     };
@@ -168,13 +167,13 @@ fn beside(mut table: Table, parameters: &[&ParameterResult], before: Option<&[Pa
 }
 
 /// Figures with error bars of ± 2 u, one for each unit.
-fn figures(values: &[&ParameterResult], before: Option<&[ParameterResult]>, name: &str, title: &str) -> Vec<Figure> {
-    let bar = |parameter: &ParameterResult| Value { value: parameter.value, u: parameter.u };
+fn figures(values: &[&Estimate], before: Option<&[Estimate]>, name: &str, title: &str) -> Vec<Figure> {
+    let bar = |parameter: &Estimate| MeasuredValue { value: parameter.value, u: parameter.u };
     let same = |id: &str| before?.iter().find(|value| value.id == id).map(bar);
     let mut figures: Vec<Figure> = Vec::new();
     for unit_name in units(values.iter().map(|value| value.unit.as_str())) {
         let own = values.iter().filter(|parameter| parameter.unit == unit_name);
-        let row = |parameter: &&ParameterResult| Row {
+        let row = |parameter: &&Estimate| Row {
             name: parameter.id.clone(),
             before: same(&parameter.id),
             after: Some(bar(parameter)),

@@ -1,6 +1,5 @@
 //! Selected poses.
 
-use abbe::identify::unit::ReadingUnit;
 use abbe::model::session::Session;
 use abbe::model::words::counted;
 use abbe::plan::poses::PoseSelection;
@@ -34,7 +33,7 @@ fn sentence(found: &PoseSelection) -> String {
         unit(&found.criterion),
         three_digits(found.value),
         three_digits(found.random_median),
-        noise(found.noise_um, ReadingUnit::Micrometre, found.noise_source)
+        noise(found.noise)
     )
 }
 

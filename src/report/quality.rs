@@ -1,6 +1,6 @@
 //! Key figures of a model: agreement of residual and noise, held-out error, rank and readings.
 
-use abbe::identify::noise::NoiseSource;
+use abbe::identify::noise::{NoiseSource, ReadingNoise};
 use abbe::identify::problem::Problem;
 use abbe::identify::results::{Goodness, GoodnessVerdict, ModelResult, NotJudged};
 use abbe::identify::unit::ReadingUnit;
@@ -20,23 +20,23 @@ fn ratio(model: &ModelResult) -> String {
 
 /// The key figures of a model, compared with those of the declared one if there is one.
 pub fn key_figures(model: &ModelResult, before: Option<&ModelResult>) -> Vec<KeyFigure> {
-    let shown = |value: f64| of_readings(value, model.reading_unit);
+    let shown = |value: f64| of_readings(value, model.noise.unit);
     let than = |figure: &dyn Fn(&ModelResult) -> String| before.map(|before| format!("before {}", figure(before)));
     let and = |before: Option<String>| before.map_or(String::new(), |before| before + "; ");
-    let judges = model.noise_source.judges();
+    let judges = model.noise.source.judges();
     let chi_square = match judges {
         true => KeyFigure::new("χ²/ν", ratio(model), and(than(&ratio)) + "expected 1"),
         false => KeyFigure::new("χ²/ν", "not testable", "the residual is taken for noise"),
     };
     let noise = match judges {
-        true => noise(model.noise_um, model.reading_unit, model.noise_source),
+        true => noise(model.noise),
         false => "noise not stated".to_string(),
     };
-    let held_out = than(&|before| shown(before.heldout_rms_um)).unwrap_or_else(|| "cross-validation".to_string());
+    let held_out = than(&|before| shown(before.fit.heldout_rms_um)).unwrap_or_else(|| "cross-validation".to_string());
     let mut figures = vec![
         chi_square,
-        KeyFigure::new("Residual rms", shown(model.rms_um), and(than(&|before| shown(before.rms_um))) + &noise),
-        KeyFigure::new("Held-out rms", shown(model.heldout_rms_um), held_out),
+        KeyFigure::new("Residual rms", shown(model.fit.rms_um), and(than(&|before| shown(before.fit.rms_um))) + &noise),
+        KeyFigure::new("Held-out rms", shown(model.fit.heldout_rms_um), held_out),
     ];
     if let (Some(rms), Some(held)) = (model.rms_3d_um, model.heldout_rms_3d_um) {
         figures.push(KeyFigure::new("3-vector", shown(rms), format!("held out {}", shown(held))));
@@ -70,7 +70,7 @@ pub fn readings(problem: &Problem, model: &ModelResult) -> KeyFigure {
         }
         some => format!("{} excluded", counted(some, "outlier")),
     };
-    KeyFigure::new("Readings", integer(model.readings), format!("{tests}, {excluded}"))
+    KeyFigure::new("Readings", integer(model.fit.readings), format!("{tests}, {excluded}"))
 }
 
 /// How far a chosen design is from the best one, by its bound.
@@ -86,9 +86,9 @@ pub fn efficiency(value: f64, bound: f64, of: &str) -> String {
 }
 
 /// The noise and its source in words. A residual is not called noise.
-pub fn noise(noise_um: f64, unit: ReadingUnit, source: NoiseSource) -> String {
-    let figure = of_readings(noise_um, unit);
-    match source {
+pub fn noise(noise: ReadingNoise) -> String {
+    let figure = of_readings(noise.value, noise.unit);
+    match noise.source {
         NoiseSource::Residual => format!("residual of the declared model {figure} (no noise stated, no repeats)"),
         other => format!("noise {figure} ({other})"),
     }
@@ -96,12 +96,12 @@ pub fn noise(noise_um: f64, unit: ReadingUnit, source: NoiseSource) -> String {
 
 /// The noise of a model and its source in words, and whether the readings of a run are correlated.
 pub fn noise_of_model(model: &ModelResult) -> String {
-    noise(model.noise_um, model.reading_unit, model.noise_source) + autocorrelated(model)
+    noise(model.noise) + autocorrelated(model)
 }
 
 /// The same as a sentence, without its full stop.
 pub fn noise_sentence_of_model(model: &ModelResult) -> String {
-    noise_sentence(model.noise_um, model.reading_unit, model.noise_source) + autocorrelated(model)
+    noise_sentence(model.noise) + autocorrelated(model)
 }
 
 fn autocorrelated(model: &ModelResult) -> &'static str {
@@ -109,13 +109,13 @@ fn autocorrelated(model: &ModelResult) -> &'static str {
 }
 
 /// The noise of a result and its source. The residual of a model is not called noise.
-pub fn noise_sentence(noise_um: f64, unit: ReadingUnit, source: NoiseSource) -> String {
-    match source {
+pub fn noise_sentence(noise: ReadingNoise) -> String {
+    let figure = of_readings(noise.value, noise.unit);
+    match noise.source {
         NoiseSource::Residual => format!(
-            "No noise is stated or follows from repeats. The uncertainties follow from the residual of the model, {}",
-            of_readings(noise_um, unit)
+            "No noise is stated or follows from repeats. The uncertainties follow from the residual of the model, {figure}"
         ),
-        other => format!("Noise standard deviation {} ({other})", of_readings(noise_um, unit)),
+        other => format!("Noise standard deviation {figure} ({other})"),
     }
 }
 

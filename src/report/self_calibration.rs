@@ -2,7 +2,6 @@
 
 use abbe::identify::results::{Interval, ModelResult};
 use abbe::identify::self_calibration::{FunctionResult, MonteCarloResult, SelfCalibration};
-use abbe::identify::unit::ReadingUnit;
 use abbe::model::session::Session;
 use abbe::model::words::counted;
 
@@ -27,7 +26,7 @@ pub fn report(session: &Session, result: &SelfCalibration) -> Report {
             format!(
                 "{}, {}, residual {}.",
                 counted(result.readings, "reading"),
-                noise(result.noise_um, ReadingUnit::Micrometre, result.noise_source),
+                noise(result.noise),
                 micrometres(result.rms_um)
             ),
             format!(
@@ -63,9 +62,9 @@ pub fn report(session: &Session, result: &SelfCalibration) -> Report {
         report.section("Monte Carlo");
         report.key(intervals(drawn).titled(format!(
             "Monte Carlo, {}, seed {}; coverage intervals of {} %, µm",
-            counted(drawn.runs, "run"),
-            drawn.seed,
-            drawn.coverage_probability * 100.0
+            counted(drawn.draws.runs, "run"),
+            drawn.draws.seed,
+            drawn.draws.coverage * 100.0
         )));
     }
     report
@@ -74,7 +73,7 @@ pub fn report(session: &Session, result: &SelfCalibration) -> Report {
 /// Every figure with all its digits, one row each; the meaning of a point of a function is its angle in degrees.
 fn values(result: &SelfCalibration) -> Table {
     let mut figures = Figures::default();
-    figures.figure("noise", result.noise_source.word(), "", result.noise_um, "um");
+    figures.figure("noise", result.noise.source.word(), "", result.noise.value, "um");
     figures.figure("residual", "rms", "", result.rms_um, "um");
     for (section, functions) in [("function", &result.functions), ("error motion", &result.error_motions)] {
         for function in functions {

@@ -41,6 +41,6 @@ pub fn report(session: &Session, file: &str, simulated: &Simulated, seed: u64) -
 
 /// The parameters that are not zero.
 fn truth(simulated: &Simulated) -> Table {
-    let rows = simulated.truth.iter().map(|(id, value, name)| cells![id, Cell::fixed(*value, 4), unit(name)]);
+    let rows = simulated.truth.iter().map(|own| cells![&own.id, Cell::fixed(own.value, 4), unit(&own.unit)]);
     Table::new(["parameter", ">value", "unit"], rows)
 }

@@ -10,8 +10,8 @@ use abbe::codegen::nc::has_letters;
 use abbe::fleet::history::{ChangedInHistory, HistoryStatements};
 use abbe::identify::results::validation::{ModelNotJudged, MovedParameter, ValidationResult, ValidationVerdict};
 use abbe::identify::results::{
-    AxisCorrection, DeterminedBy, GoodStatement, LineQuantity, MeasureStatement, NextStep, NotJudged, ParameterResult,
-    Statements, ValidationStatement,
+    AxisCorrection, DeterminedBy, Estimate, GoodStatement, LineQuantity, MeasureStatement, NextStep, NotJudged,
+    ParameterChange, Statements, ValidationStatement,
 };
 use abbe::identify::tolerance::rule::Decision;
 use abbe::model::chain::Machine;
@@ -97,8 +97,8 @@ fn correct(statements: &Statements) -> String {
         };
     }
     let further = || {
-        let mut further: Vec<&ParameterResult> = statements.further.iter().collect();
-        let ratio = |found: &ParameterResult| (found.value / found.u).abs();
+        let mut further: Vec<&Estimate> = statements.further.iter().collect();
+        let ratio = |found: &Estimate| (found.value / found.u).abs();
         further.sort_by(|a, b| ratio(b).total_cmp(&ratio(a)));
         further.into_iter()
     };
@@ -262,6 +262,10 @@ fn percent(share: f64) -> String {
     if percent > 0.0 && percent < 1.0 { "< 1 %".to_string() } else { format!("{percent:.0} %") }
 }
 
+fn changed_by(change: &ParameterChange) -> String {
+    estimate(change.value, change.u, &change.unit)
+}
+
 /// What has changed, what to correct and to measure after a validation.
 pub fn of_validation(
     statements: &Statements<ValidationStatement, MovedParameter>,
@@ -275,7 +279,7 @@ pub fn of_validation(
     let moved = statements
         .changed
         .iter()
-        .map(|moved| format!("{} has moved by {}", moved.id, estimate(moved.value, moved.u, &moved.unit)));
+        .map(|MovedParameter { change, .. }| format!("{} has moved by {}", change.id, changed_by(change)));
     let mut sentences: Vec<Sentence> = Vec::new();
     if !statements.changed.is_empty() {
         let volume = match result.volumetric_rms_um[..] {
@@ -342,12 +346,11 @@ pub fn of_comparison(
     commands: &Commands,
 ) -> Vec<Sentence> {
     let last = comparison.inputs.last().map_or("", String::as_str);
-    let changed = statements.changed.iter().map(|d| format!("{} {}", d.id, estimate(d.value, d.u, &d.unit)));
+    let changed =
+        statements.changed.iter().map(|Difference { change, .. }| format!("{} {}", change.id, changed_by(change)));
     let single: Vec<String> = (comparison.pairs.iter().filter(|pair| pair.significant > 1))
         .flat_map(|pair| &pair.single_changes)
-        .map(|one| {
-            format!("{} {} (probability {})", one.id, estimate(one.value, one.u, &one.unit), percent(one.probability))
-        })
+        .map(|one| format!("{} {} (probability {})", one.change.id, changed_by(&one.change), percent(one.probability)))
         .collect();
     let changed = match statements.changed.is_empty() {
         true => "nothing significant".to_string(),

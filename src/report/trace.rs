@@ -52,7 +52,7 @@ pub fn report(
     sentences.push(
         format!(
             "{}, {}; {} of {} detectable.",
-            counted(result.after.readings, "reading"),
+            counted(result.after.fit.readings, "reading"),
             noise(result, &problem.session),
             result.candidates_detectable,
             counted(result.candidates, "candidate")
@@ -232,9 +232,9 @@ fn next(result: &TraceResult, measure: NextStep, commands: &Commands) -> Vec<(St
 /// The noise and its source in words. A residual is not called noise. Many repeats, or a few that contradict it, take the place
 /// of a stated noise in a trace, and not in a fit.
 fn noise(result: &TraceResult, session: &Session) -> String {
-    if result.after.noise_source.judges() || result.effects.is_empty() {
+    if result.after.noise.source.judges() || result.effects.is_empty() {
         let stated_um = session.stated_noise_mm().map(|mm| mm * 1e3).filter(|_| result.reading_unit.is_micrometre());
-        let stated = match (result.after.noise_source, stated_um) {
+        let stated = match (result.after.noise.source, stated_um) {
             (NoiseSource::Repeats, Some(um)) => format!("; stated {}", of_readings(um, result.reading_unit)),
             _ => String::new(),
         };
@@ -242,17 +242,17 @@ fn noise(result: &TraceResult, session: &Session) -> String {
     }
     format!(
         "residual of the declared model {}, with the effects {} (no noise stated, no repeats)",
-        of_readings(result.before.noise_um, result.reading_unit),
-        of_readings(result.after.noise_um, result.reading_unit)
+        of_readings(result.before.noise.value, result.reading_unit),
+        of_readings(result.after.noise.value, result.reading_unit)
     )
 }
 
 /// The residual of the declared model, and with the effects.
 pub fn before_and_after(result: &TraceResult) -> Table {
     // The residual itself is no measure of the noise.
-    let judges = result.after.noise_source.judges();
+    let judges = result.after.noise.source.judges();
     let row = |name: &str, model: &ModelResult| {
-        let mut cells = cells![name, Cell::fixed(model.rms_um, 3), Cell::fixed(model.heldout_rms_um, 3)];
+        let mut cells = cells![name, Cell::fixed(model.fit.rms_um, 3), Cell::fixed(model.fit.heldout_rms_um, 3)];
         if let (Some(rms), Some(held)) = (model.rms_3d_um, model.heldout_rms_3d_um) {
             cells.extend([rms, held].map(|um| Cell::fixed(um, 1)));
         }
@@ -302,7 +302,7 @@ pub fn remainder(result: &TraceResult) -> Option<String> {
 /// Parameters that changed by more than their uncertainty when the effects were added.
 fn changes(result: &TraceResult) -> Vec<String> {
     let changes = result.changed_parameters.iter().map(|changed| {
-        let (change, u) = value_and_u(changed.change, changed.u);
+        let (change, u) = value_and_u(changed.value, changed.u);
         format!("{}  {} (u {u})", changed.id, quantity(&change, &changed.unit))
     });
     changes.collect()

@@ -75,7 +75,7 @@ const WORSE: f64 = 1.01;
 pub fn worse_prediction(effect: &EffectResult, alias: usize) -> Option<String> {
     let of_effect = effect.left_out_test_rms_um?;
     let of_alias = effect.aliases_left_out_test_rms_um.get(alias).copied().flatten()?;
-    let [alias, own] = [of_alias, of_effect].map(|rms| of_readings(rms, effect.reading_unit));
+    let [alias, own] = [of_alias, of_effect].map(|rms| of_readings(rms, effect.unit));
     let words = || format!("left-out test {alias}, with the effect {own}");
     (of_alias > WORSE * of_effect).then(words)
 }

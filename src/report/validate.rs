@@ -1,8 +1,7 @@
 //! A validated model: verdict, residuals of each machine, moved parameters, share of each effect.
 
 use abbe::document::StatedValidation;
-use abbe::identify::results::validation::RmsResult;
-use abbe::identify::results::validation::{ValidationResult, ValidationVerdict};
+use abbe::identify::results::validation::{JudgedResidual, RmsResult, ValidationResult, ValidationVerdict};
 use abbe::model::words::counted;
 use abbe::trace::validate::Validation;
 
@@ -61,11 +60,12 @@ pub fn report(machine: &str, validation: &Validation, stated: &StatedValidation<
 }
 
 fn key_figures(result: &ValidationResult) -> Vec<KeyFigure> {
-    let shown = |value: f64| of_readings(value, result.reading_unit);
+    let shown = |value: f64| of_readings(value, result.noise.unit);
     let model = &result.model;
-    let predicted = format!("predicted {}", shown(model.predicted_rms_um));
-    let mut figures = vec![KeyFigure::new("Residual rms", shown(model.rms.rms_um), predicted)];
-    let length = model.rms.rms_3d_um.map(|length| KeyFigure::new("Residual vector", shown(length), "rms length"));
+    let predicted = format!("predicted {}", shown(model.residual.predicted_rms_um));
+    let mut figures = vec![KeyFigure::new("Residual rms", shown(model.residual.rms.rms_um), predicted)];
+    let length =
+        model.residual.rms.rms_3d_um.map(|length| KeyFigure::new("Residual vector", shown(length), "rms length"));
     figures.extend(length);
     figures.extend([
         KeyFigure::new(
@@ -73,7 +73,11 @@ fn key_figures(result: &ValidationResult) -> Vec<KeyFigure> {
             shown(result.locations.rms_um),
             format!("nominal machine {}", shown(result.nominal.rms_um)),
         ),
-        KeyFigure::new("In 95 % intervals", format!("{:.1} %", 100.0 * model.coverage_95), "of scalar readings"),
+        KeyFigure::new(
+            "In 95 % intervals",
+            format!("{:.1} %", 100.0 * model.residual.coverage_95),
+            "of scalar readings",
+        ),
         KeyFigure::new("Readings", integer(result.readings), format!("{} inside the range", result.readings_in_range)),
     ]);
     figures
@@ -100,7 +104,7 @@ fn sentence(result: &ValidationResult) -> String {
 
 /// The readings, those inside the range, and the noise.
 fn readings(result: &ValidationResult) -> String {
-    let shown = |value: f64| of_readings(value, result.reading_unit);
+    let shown = |value: f64| of_readings(value, result.noise.unit);
     let outside = match result.outside.as_slice() {
         [] => String::new(),
         names => format!(" (outside: {})", names.join(", ")),
@@ -113,41 +117,38 @@ fn readings(result: &ValidationResult) -> String {
         "{}, {} inside the range of the model{outside}{outliers}; noise {} ({})",
         counted(result.readings, "reading"),
         result.readings_in_range,
-        shown(result.noise_um),
-        result.noise_source
+        shown(result.noise.value),
+        result.noise.source
     )
 }
 
 /// Rms of each machine, with what the model predicts and covers.
 pub fn residuals(result: &ValidationResult) -> Table {
-    let shown = |value: f64| of_readings(value, result.reading_unit);
+    let shown = |value: f64| of_readings(value, result.noise.unit);
     let length = |rms: &RmsResult| rms.rms_3d_um.map_or("–".to_string(), shown);
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
     let row = |name: &str, rms: &RmsResult| {
         cells![name, shown(rms.rms_um), length(rms), Cell::fixed(rms.noise_ratio, 3), "–", "–", "–"]
     };
     let model = &result.model;
-    let predicted = |rms: &RmsResult, predicted_um: f64, ratio: f64, coverage: f64, name: &str| {
+    let predicted = |name: &str, residual: &JudgedResidual| {
         cells![
             name,
-            shown(rms.rms_um),
-            length(rms),
-            Cell::fixed(rms.noise_ratio, 3),
-            shown(predicted_um),
-            Cell::fixed(ratio, 3),
-            percent(coverage)
+            shown(residual.rms.rms_um),
+            length(&residual.rms),
+            Cell::fixed(residual.rms.noise_ratio, 3),
+            shown(residual.predicted_rms_um),
+            Cell::fixed(residual.residual_ratio, 3),
+            percent(residual.coverage_95)
         ]
     };
     let mut rows = vec![
         row("nominal machine", &result.nominal),
         row("location errors", &result.locations),
-        predicted(&model.rms, model.predicted_rms_um, model.residual_ratio, model.coverage_95, "model"),
+        predicted("model", &model.residual),
     ];
-    rows.extend(model.in_range.as_ref().map(|inside| {
-        let name = "model, inside its range";
-        predicted(&inside.rms, inside.predicted_rms_um, inside.residual_ratio, inside.coverage_95, name)
-    }));
-    let three = model.rms.rms_3d_um.is_some();
+    rows.extend(model.in_range.as_ref().map(|inside| predicted("model, inside its range", inside)));
+    let three = model.residual.rms.rms_3d_um.is_some();
     let mut table =
         Table::new(["machine", ">rms", ">3-vector", ">of noise", ">predicted rms", ">of predicted", ">in 95 %"], rows);
     table.notes.push(
@@ -165,8 +166,9 @@ pub fn residuals(result: &ValidationResult) -> Table {
 /// The moved parameters.
 pub fn moved(result: &ValidationResult) -> Table {
     let rows = result.moved.iter().map(|moved| {
-        let [value, u] = Cell::estimate(moved.value, moved.u);
-        cells![&moved.id, value, u, unit(&moved.unit), probability(moved.p_value), moved.alternatives.join(", ")]
+        let [value, u] = Cell::estimate(moved.change.value, moved.change.u);
+        let alternatives = moved.alternatives.join(", ");
+        cells![&moved.change.id, value, u, unit(&moved.change.unit), probability(moved.p_value), alternatives]
     });
     Table::new(["parameter", ">change", ">u", "unit", ">p", "or instead"], rows)
         .titled("Parameters that have moved since the model, with standard uncertainty u")
@@ -174,15 +176,15 @@ pub fn moved(result: &ValidationResult) -> Table {
 
 /// The model without each effect, the most important first.
 pub fn without(result: &ValidationResult) -> Table {
-    let shown = |value: f64| of_readings(value, result.reading_unit);
+    let shown = |value: f64| of_readings(value, result.noise.unit);
     let mut order: Vec<usize> = (0..result.without.len()).collect();
     order.sort_by(|a, b| result.without[*b].rms.rms_um.total_cmp(&result.without[*a].rms.rms_um));
     let rows = order.into_iter().map(|k| {
         let without = &result.without[k];
-        let change = without.rms.rms_um - result.model.rms.rms_um;
+        let change = without.rms.rms_um - result.model.residual.rms.rms_um;
         cells![&without.effect, shown(without.rms.rms_um), format!("{change:+.3}")]
     });
-    let change = format!("change, {}", unit(result.reading_unit.name()));
+    let change = format!("change, {}", unit(result.noise.unit.name()));
     Table::new([words("effect"), numbers("rms without it"), numbers(change)], rows)
         .titled("The model without each effect; an effect that lowers no residual does not hold here")
 }
@@ -199,7 +201,7 @@ fn set_up(result: &ValidationResult) -> Table {
 
 /// Every figure with all its digits, one row per figure.
 fn values(result: &ValidationResult) -> Table {
-    let unit = result.reading_unit.name();
+    let unit = result.noise.unit.name();
     let mut figures = Figures::default();
     figures.statement("verdict", result.verdict.word(), &sentence(result));
     let mut rms = |id: &str, rms: &RmsResult| {
@@ -210,24 +212,24 @@ fn values(result: &ValidationResult) -> Table {
     };
     rms("nominal", &result.nominal);
     rms("locations", &result.locations);
-    rms("model", &result.model.rms);
+    rms("model", &result.model.residual.rms);
     if let Some(inside) = &result.model.in_range {
         rms("model in range", &inside.rms);
     }
     for without in &result.without {
         rms(&format!("without {}", without.effect), &without.rms);
     }
-    figures.figure("prediction", "predicted rms", "", result.model.predicted_rms_um, unit);
-    figures.figure("prediction", "coverage", "share inside the 95 % intervals", result.model.coverage_95, "1");
+    figures.figure("prediction", "predicted rms", "", result.model.residual.predicted_rms_um, unit);
+    figures.figure("prediction", "coverage", "share inside the 95 % intervals", result.model.residual.coverage_95, "1");
     let mut table = figures.table();
     table.rows.extend(result.moved.iter().map(|moved| {
         cells![
             "moved",
-            &moved.id,
+            &moved.change.id,
             "change since the model",
-            Cell::exact(moved.value),
-            Cell::exact(moved.u),
-            &moved.unit
+            Cell::exact(moved.change.value),
+            Cell::exact(moved.change.u),
+            &moved.change.unit
         ]
     }));
     table

@@ -27,8 +27,8 @@ pub fn of_machines(result: &ValidationResult) -> Vec<Figure> {
     let mut rows = vec![
         ("nominal machine".to_string(), result.nominal.rms_um, Fill::Other),
         ("location errors".to_string(), result.locations.rms_um, Fill::Alias),
-        ("model".to_string(), model.rms.rms_um, Fill::Named),
-        ("predicted".to_string(), model.predicted_rms_um, Fill::Other),
+        ("model".to_string(), model.residual.rms.rms_um, Fill::Named),
+        ("predicted".to_string(), model.residual.predicted_rms_um, Fill::Other),
     ];
     rows.extend(
         model.in_range.as_ref().map(|inside| ("model, inside its range".to_string(), inside.rms.rms_um, Fill::Named)),
@@ -43,7 +43,7 @@ pub fn of_effects(result: &ValidationResult) -> Vec<Figure> {
         .without
         .iter()
         .map(|without| {
-            let change = without.rms.rms_um - result.model.rms.rms_um;
+            let change = without.rms.rms_um - result.model.residual.rms.rms_um;
             (without.effect.clone(), change, if change > 0.0 { Fill::Named } else { Fill::Other })
         })
         .collect();

@@ -123,17 +123,23 @@ fn a_model_holds_on_a_second_session_and_changes_are_named() {
     let [mut holds, mut near, mut covered, mut said, mut named, mut first] = [Rate::default(); 6];
     let mut coverage = Vec::new();
     for (pair, [unchanged, changed], oracle_um, id) in &outcomes {
-        let ratio = unchanged.model.rms.rms_um / oracle_um;
+        let ratio = unchanged.model.residual.rms.rms_um / oracle_um;
         holds.count(unchanged.verdict == ValidationVerdict::Holds);
         near.count((ratio - 1.0).abs() <= 0.05);
-        covered.count((0.90..=0.98).contains(&unchanged.model.coverage_95));
-        coverage.push(unchanged.model.coverage_95);
+        covered.count((0.90..=0.98).contains(&unchanged.model.residual.coverage_95));
+        coverage.push(unchanged.model.residual.coverage_95);
         said.count(changed.verdict != ValidationVerdict::Holds);
-        named.count(changed.moved.iter().any(|moved| moved.id == *id || moved.alternatives.contains(id)));
-        first.count(changed.moved.iter().any(|moved| moved.id == *id));
+        named.count(changed.moved.iter().any(|moved| moved.change.id == *id || moved.alternatives.contains(id)));
+        first.count(changed.moved.iter().any(|moved| moved.change.id == *id));
         if verbose() {
             let moved = |result: &ValidationResult| {
-                result.moved.iter().map(|m| format!("{} {:.1}σ", m.id, m.value / m.u)).collect::<Vec<_>>().join(" ")
+                result
+                    .moved
+                    .iter()
+                    .map(|m| &m.change)
+                    .map(|m| format!("{} {:.1}σ", m.id, m.value / m.u))
+                    .collect::<Vec<_>>()
+                    .join(" ")
             };
             println!(
                 "{}: {:?} {} of {:?}; rms/oracle {ratio:.3}, ratio {:.3} p {:.1e}, coverage {:.3}, {} [{}]; changed {id}: {} [{}]",
@@ -141,9 +147,9 @@ fn a_model_holds_on_a_second_session_and_changes_are_named() {
                 pair.noise,
                 pair.model.effects.iter().map(|effect| effect.id()).collect::<Vec<_>>().join(" "),
                 crate::plant::named(&pair.effect),
-                unchanged.model.residual_ratio,
-                unchanged.model.p_value,
-                unchanged.model.coverage_95,
+                unchanged.model.residual.residual_ratio,
+                unchanged.model.residual.p_value,
+                unchanged.model.residual.coverage_95,
                 unchanged.verdict,
                 moved(unchanged),
                 changed.verdict,

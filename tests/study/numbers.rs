@@ -1,7 +1,7 @@
 //! Effects whose shape has numbers (a centre, a width, a period, a time constant): the uncertainty of these numbers, and of
 //! the errors of the machine that share a part with the effect.
 
-use abbe::identify::results::{EffectName, EffectResult, ParameterResult};
+use abbe::identify::results::{EffectName, EffectResult, Estimate};
 
 use super::judging::{found, is, pulls, summary};
 use super::rates::{Pulls, Rate};
@@ -38,9 +38,9 @@ fn with_numbers(number: usize) -> (Kind, Noise, Vec<Injected>) {
 fn estimated<'r>(
     effect: &'r EffectResult,
     truth: &'r Injected,
-) -> impl Iterator<Item = (&'static str, f64, &'r ParameterResult)> {
+) -> impl Iterator<Item = (&'static str, f64, &'r Estimate)> {
     numbers(truth).into_iter().filter_map(|(name, value)| {
-        let own = |parameter: &&ParameterResult| parameter.id.ends_with(&format!(".{name}"));
+        let own = |parameter: &&Estimate| parameter.id.ends_with(&format!(".{name}"));
         effect.parameters.iter().find(own).map(|parameter| (name, value, parameter))
     })
 }

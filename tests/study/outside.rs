@@ -46,6 +46,6 @@ fn a_harmonic_of_varying_amplitude_is_not_attributed_to_noise() {
     for outcome in &run(41..42, outside_case) {
         assert!(is_honest(outcome), "{}", summary(outcome, "WRONG"));
         // The simulated noise is 0.3 µm.
-        assert!(outcome.result.after.noise_um < 0.35, "{}", summary(outcome, "NOISE"));
+        assert!(outcome.result.after.noise.value < 0.35, "{}", summary(outcome, "NOISE"));
     }
 }

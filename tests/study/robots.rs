@@ -61,7 +61,7 @@ fn robot(number: u64) -> Searched {
         truth: format!("{poses} poses, noise {noise:.0} µm, {}{compliant}", waves.join(", ")),
         oracle_heldout_um: oracle.heldout_um(&first),
         oracle_second_um: oracle.predicted_um(&second),
-        second_um: validate(&model, &of_second).unwrap().result.model.rms.rms_um,
+        second_um: validate(&model, &of_second).unwrap().result.model.residual.rms.rms_um,
         unstated: searched(&of_unstated, &[], None),
         single: searched(&of_stated, &[":spectrum", "~gravity"], None),
         stated,
@@ -79,7 +79,7 @@ impl Searched {
     fn summary(&self) -> String {
         let figures = |outcome: &TraceOutcome| {
             let ids: Vec<String> = outcome.effects.iter().map(|effect| effect.id()).collect();
-            format!("{:.1} {} {}", outcome.result.after.heldout_rms_um, outcome.result.verdict, ids.join(" "))
+            format!("{:.1} {} {}", outcome.result.after.fit.heldout_rms_um, outcome.result.verdict, ids.join(" "))
         };
         format!(
             "{}: {}; oracle {:.1} {:.1}, second {:.1}\n  stated {}\n  unstated {}\n  single {}",
@@ -113,7 +113,7 @@ fn a_search_on_robots_predicts_as_well_as_a_fit_that_knows_the_effects() {
     let [mut heldout, mut second, mut families, mut statement, mut honest] = [Rate::default(); 5];
     for one in &found {
         let [stated, unstated, single] =
-            [&one.stated, &one.unstated, &one.single].map(|outcome| outcome.result.after.heldout_rms_um);
+            [&one.stated, &one.unstated, &one.single].map(|outcome| outcome.result.after.fit.heldout_rms_um);
         heldout.count(stated <= NEAR * one.oracle_heldout_um);
         second.count(one.second_um <= NEAR * one.oracle_second_um);
         families.count(stated <= 1.01 * single);

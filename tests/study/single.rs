@@ -77,7 +77,7 @@ fn tally(outcomes: &[TracedSession]) -> Tally {
             }
         }
         let best = oracle(outcome.kind, outcome.noise).heldout_rms_um(&outcome.draw, &outcome.draw.truth.effects);
-        let ratio = outcome.result.after.heldout_rms_um / best;
+        let ratio = outcome.result.after.fit.heldout_rms_um / best;
         tally.held_out.push(ratio);
         tally.near.count((ratio - 1.0).abs() <= 0.05);
         tally.before.0.extend(pulls(outcome, &outcome.result.before).0);
@@ -90,7 +90,7 @@ fn tally(outcomes: &[TracedSession]) -> Tally {
                 (false, 0) => "NONE",
                 (false, _) => "WRONG",
             };
-            let off = outcome.result.after.heldout_rms_um / best - 1.0;
+            let off = outcome.result.after.fit.heldout_rms_um / best - 1.0;
             println!(
                 "{} held out {:+.1} % of the oracle's; pulls {:.1?}",
                 summary(outcome, mark),

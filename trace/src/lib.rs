@@ -28,11 +28,11 @@
 //!
 //! let (problem, found) = fit::prepare(&session, 1)?;
 //! let declared = fit::report(&problem, &found)?;
-//! assert!((declared.model.rms_um - 0.548).abs() < 0.001);
+//! assert!((declared.model.fit.rms_um - 0.548).abs() < 0.001);
 //!
 //! let options = TraceOptions { only: vec!["EZC".into()], draws: 99, ..TraceOptions::default() };
 //! let found = trace(&session, &options, &|_| true)?.result;
-//! assert!((found.after.rms_um - 0.304).abs() < 0.001);
+//! assert!((found.after.fit.rms_um - 0.304).abs() < 0.001);
 //! let amplitude = &found.effects[0].parameters[0];
 //! assert_eq!(amplitude.id, "EZC~C:h2.amplitude");
 //! assert!((amplitude.value - 1.5).abs() < 3.0 * amplitude.u);

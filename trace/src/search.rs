@@ -31,12 +31,12 @@ impl SearchRecord<'_> {
     /// Records accepted additions.
     fn note(&mut self, search: &SearchState<'_>, added: impl Iterator<Item = usize>) {
         let held_out = search.selection.held_out.last().copied().unwrap_or(0.0);
-        let heldout_rms_um = (held_out / search.columns.rows().max(1) as f64).sqrt() * self.noise_um;
+        let heldout_um = (held_out / search.columns.rows().max(1) as f64).sqrt() * self.noise_um;
         let effects = search.selected().len();
         for candidate in added {
             let id = search.effect(candidate).id();
-            self.steps.push(SearchStep { id: id.clone(), effects, heldout_rms_um });
-            (self.progress)(Progress::SelectedEffect(effects, id, heldout_rms_um, search.columns.unit()));
+            self.steps.push(SearchStep { id: id.clone(), effects, heldout_um });
+            (self.progress)(Progress::SelectedEffect(effects, id, heldout_um, search.columns.unit()));
         }
     }
 }

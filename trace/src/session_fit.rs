@@ -6,7 +6,7 @@
 use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::{Fit, prepare, report};
 use abbe_identify::problem::Problem;
-use abbe_identify::results::{FitResult, ParameterResult};
+use abbe_identify::results::{Estimate, FitResult};
 use abbe_identify::tolerance::conformity;
 use abbe_model::session::Session;
 
@@ -39,7 +39,7 @@ impl SessionFit {
     }
 
     /// The estimate of an identifiable parameter, such as `EX0C`, in its display unit.
-    pub fn parameter(&self, id: &str) -> Option<&ParameterResult> {
+    pub fn parameter(&self, id: &str) -> Option<&Estimate> {
         self.result.model.parameters.iter().find(|parameter| parameter.id == id)
     }
 

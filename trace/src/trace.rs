@@ -81,7 +81,7 @@ pub struct SearchStep {
     /// Number of effects after this addition.
     pub effects: usize,
     /// Held-out rms after this addition, µm.
-    pub heldout_rms_um: f64,
+    pub heldout_um: f64,
 }
 
 /// The outcome of a trace: the models before and after, and the result.

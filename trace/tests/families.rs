@@ -144,7 +144,7 @@ fn a_stated_scale_is_used_and_an_estimated_one_is_that_of_the_family() {
         let result = report(&found.problem, &found.fit).unwrap();
         assert!(result.model.parameters.iter().any(|p| p.id == "EBJ2~J2:spectrum.rms" && p.u > 0.0));
         assert!(!result.model.parameters.iter().any(|p| p.id.contains(".cos")));
-        result.model.rms_um
+        result.model.fit.rms_um
     };
     // Far too small a scale leaves the error in the residual; the estimated one does not. The errors of the other joints
     // remain.

@@ -83,7 +83,7 @@ fn models(inputs: Vec<Input>, seed: u64) -> Result<Vec<Prepared>, ApplyError> {
     }
     let model = |input: Input| match input {
         Input::Model(model) => {
-            let not_judged = model.forbids_decisions().map(|why| (false, model.quality.u_enlargement, why));
+            let not_judged = model.forbids_decisions().map(|why| (false, model.fit.u_enlargement, why));
             Ok(Prepared { model: *model, outliers: Vec::new(), not_judged })
         }
         Input::Session(session) => {

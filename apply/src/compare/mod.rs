@@ -136,8 +136,6 @@ fn pair(a: &Named<'_>, b: &Named<'_>, options: &CompareOptions) -> Result<Compar
     let id = |k: usize| a.model.parameters[common[k].0].id.clone();
     let mut differences = Vec::new();
     for k in (0..common.len()).filter(|k| !held.contains(k)) {
-        let parameter = &a.model.parameters[common[k].0];
-        let display = parameter.unit.display_per_internal;
         let u = covariance[(k, k)].max(0.0).sqrt();
         if u == 0.0 {
             continue;
@@ -145,10 +143,7 @@ fn pair(a: &Named<'_>, b: &Named<'_>, options: &CompareOptions) -> Result<Compar
         differences.push(Difference {
             from: a.name.clone(),
             to: b.name.clone(),
-            id: id(k),
-            value: delta[k] * display,
-            u: u * display,
-            unit: parameter.unit.name.clone(),
+            change: a.model.parameters[common[k].0].change(delta[k], u),
             p_value: (2.0 * normal_tail((delta[k] / u).abs())).min(1.0),
             significant: false,
         });

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::workspace::VolumetricSummary;
-use abbe_identify::results::Outlier;
+use abbe_identify::results::{Outlier, ParameterChange};
 
 /// The result of `abbe compare`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
@@ -58,14 +58,9 @@ pub struct Difference {
     pub from: String,
     /// The other input.
     pub to: String,
-    /// Identifier: `EX0C`, `EZC~C:h2.cos`.
-    pub id: String,
-    /// Value in the other input less that in the first, in `unit`.
-    pub value: f64,
-    /// Standard uncertainty of the difference, in `unit`.
-    pub u: f64,
-    /// Unit of `value` and `u`.
-    pub unit: String,
+    /// The value in the other input less that in the first.
+    #[serde(flatten)]
+    pub change: ParameterChange,
     /// Probability of a larger difference by chance, for this parameter alone.
     pub p_value: f64,
     /// Whether the difference is significant at the level over all parameters of the pair (Holm). Not if the pair is not
@@ -111,14 +106,9 @@ pub struct Pair {
 /// A change of one parameter alone that explains all differences of a pair.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SingleChange {
-    /// The parameter, which may be one that is held at nominal.
-    pub id: String,
-    /// Its change, in `unit`.
-    pub value: f64,
-    /// Standard uncertainty, in `unit`.
-    pub u: f64,
-    /// Unit of `value` and `u`.
-    pub unit: String,
+    /// The change of the parameter, which may be one that is held at nominal.
+    #[serde(flatten)]
+    pub change: ParameterChange,
     /// χ² of what it leaves of the differences.
     pub chi_square: f64,
     /// Probability of a larger remainder by chance.
@@ -130,14 +120,9 @@ pub struct SingleChange {
 /// A set-up quantity of one name that is not one object in both sessions.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct NotShared {
-    /// Identifier: `bar[C100]`.
-    pub id: String,
-    /// Deviation in the other input less that in the first, by the readings alone, in `unit`.
-    pub value: f64,
-    /// Standard uncertainty of the difference, in `unit`.
-    pub u: f64,
-    /// Unit of `value` and `u`.
-    pub unit: String,
+    /// Deviation in the other input less that in the first, by the readings alone.
+    #[serde(flatten)]
+    pub change: ParameterChange,
     /// Probability of a larger difference if it were one object.
     pub p_value: f64,
     /// Whether the readings show that it is not. Otherwise they show it of another object of its kind.

@@ -88,7 +88,7 @@ pub(super) fn difference(
     };
     add(a, &|i| i)?;
     add(b, &place_b)?;
-    let enlargement = a.quality.u_enlargement.max(b.quality.u_enlargement);
+    let enlargement = a.fit.u_enlargement.max(b.fit.u_enlargement);
     for (i, _) in &shared {
         if let Prior::Gaussian(u) = a.parameters[*i].prior {
             information[(*i, *i)] -= (enlargement * u).powi(-2);
@@ -145,7 +145,7 @@ fn test(a: &IdentifiedModel, b: &IdentifiedModel, (i, j): (usize, usize)) -> Opt
     let alone = |model: &IdentifiedModel, k: usize| {
         let variance = model.covariance[(k, k)];
         let of_prior = match model.parameters[k].prior {
-            Prior::Gaussian(u) => (model.quality.u_enlargement * u).powi(-2),
+            Prior::Gaussian(u) => (model.fit.u_enlargement * u).powi(-2),
             Prior::Free | Prior::Known => 0.0,
         };
         let information = 1.0 / variance - of_prior;
@@ -154,14 +154,9 @@ fn test(a: &IdentifiedModel, b: &IdentifiedModel, (i, j): (usize, usize)) -> Opt
             .then(|| (model.parameters[k].value / (variance * information), 1.0 / information))
     };
     let ((of_a, variance_a), (of_b, variance_b)) = (alone(a, i)?, alone(b, j)?);
-    let parameter = &a.parameters[i];
-    let display = parameter.unit.display_per_internal;
     let (value, u) = (of_b - of_a, (variance_a + variance_b).sqrt());
     Some(NotShared {
-        id: parameter.id.clone(),
-        value: value * display,
-        u: u * display,
-        unit: parameter.unit.name.clone(),
+        change: a.parameters[i].change(value, u),
         p_value: (2.0 * normal_tail((value / u).abs())).min(1.0),
         refuted: false,
     })

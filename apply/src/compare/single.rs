@@ -41,13 +41,8 @@ pub(super) fn explanations(
         }
         let along: f64 = own.iter().zip(&white).map(|(own, value)| own * value).sum();
         let chi_square = (total - along * along / information).max(0.0);
-        let parameter = &a.model.parameters[*i];
-        let display = parameter.unit.display_per_internal;
         found.push(SingleChange {
-            id: parameter.id.clone(),
-            value: along / information * display,
-            u: information.sqrt().recip() * display,
-            unit: parameter.unit.name.clone(),
+            change: a.model.parameters[*i].change(along / information, information.sqrt().recip()),
             chi_square,
             p_value: chi_square_tail(chi_square, metric.rank().saturating_sub(1) as f64),
             probability: 0.0,

@@ -6,6 +6,7 @@ use abbe_files::ReadOptions;
 use abbe_identify::fit;
 use abbe_identify::model_file::{ModelParameter, Provenance};
 use abbe_identify::quantity::Given;
+use abbe_identify::results::ParameterChange;
 use abbe_identify::simulate::{Simulation, simulate};
 use abbe_model::instrument::ballbar::BAR;
 use abbe_model::session::{Prior, Session};
@@ -68,11 +69,11 @@ fn study(plan: Session, second: impl Fn(&[(String, f64)]) -> Vec<(String, f64)>)
         study.freedom += same.pairs[0].degrees_of_freedom;
         study.shared += same.pairs[0].shared_setup.len();
         assert_eq!(same.pairs[0].shared_setup.len() + same.pairs[0].not_shared.len(), 4);
-        let u = same.differences.iter().find(|difference| difference.id == "EX0C").unwrap().u;
+        let u = same.differences.iter().find(|difference| difference.change.id == "EX0C").unwrap().change.u;
         let after = vec![("EX0C".to_string(), 10.0 + 5.0 * u), before[1].clone()];
         let c = model(&plan, &after, &others, 1001 + 2 * number);
         let changed = compared(&a, &c);
-        study.found += usize::from(changed.differences.iter().any(|d| d.id == "EX0C" && d.significant));
+        study.found += usize::from(changed.differences.iter().any(|d| d.change.id == "EX0C" && d.significant));
     }
     println!(
         "{pairs} pairs: {} with a false claim, {} with the change found, χ² {:.1} of {}, {} of {} bars shared",
@@ -119,10 +120,7 @@ fn the_procedure_of_holm_steps_down() {
     let difference = |p_value: f64| Difference {
         from: String::new(),
         to: String::new(),
-        id: String::new(),
-        value: 0.0,
-        u: 1.0,
-        unit: String::new(),
+        change: ParameterChange { id: String::new(), value: 0.0, u: 1.0, unit: String::new() },
         p_value,
         significant: false,
     };
@@ -164,9 +162,12 @@ fn differences_do_not_depend_on_the_gauge() {
     let reference =
         compare(&[Named { name: "A".into(), model: &a }, Named { name: "B".into(), model: &b }], &options).unwrap();
     for difference in &reference.differences {
-        let other = again.differences.iter().find(|other| other.id == difference.id).unwrap();
+        let other = again.differences.iter().find(|other| other.change.id == difference.change.id).unwrap();
         // The null directions of the two sessions differ in second order of the errors.
-        assert!((difference.value - other.value).abs() < 1e-3 * difference.u, "{difference:?} {other:?}");
+        assert!(
+            (difference.change.value - other.change.value).abs() < 1e-3 * difference.change.u,
+            "{difference:?} {other:?}"
+        );
     }
 }
 
@@ -206,12 +207,12 @@ fn a_shared_bar_keeps_one_prior_under_enlarged_uncertainties() {
         });
         model.covariance = square * faer::Scale(enlargement * enlargement);
         model.null_directions = Vec::new();
-        model.quality.u_enlargement = enlargement;
+        model.fit.u_enlargement = enlargement;
         model
     };
     let found = compared(&of(0.005, 1.0, 2.0), &of(0.017, 2.0, 3.0));
     assert_eq!(found.pairs[0].shared_setup, ["bar[C100]"]);
-    let difference = &found.differences[0];
+    let difference = &found.differences[0].change;
     assert!((difference.value - 12.0).abs() < 1e-6, "{difference:?}");
     // 2² + 3² of the noises of 1 µm, and (2·2)² of the bar.
     assert!((difference.u / 29.0_f64.sqrt() - 1.0).abs() < 1e-6, "{difference:?}");

@@ -1,9 +1,10 @@
 //! Exported descriptions, read by kinematics that know the format and not its writer.
 
 use abbe_files::robot::dh::Convention;
-use abbe_identify::model_file::{IdentifiedModel, ModelParameter, Provenance, Quality};
+use abbe_identify::model_file::{IdentifiedModel, ModelParameter, Provenance};
 use abbe_identify::noise::{Noise, NoiseSource};
 use abbe_identify::parameters::Role;
+use abbe_identify::results::ModelFit;
 use abbe_identify::unit::Unit;
 use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::frames::Point;
@@ -40,8 +41,8 @@ pub(super) fn model(machine: Machine, errors: &[(String, f64)]) -> IdentifiedMod
         null_directions: Vec::new(),
         locations: Vec::new(),
         noise: Noise::white(1e-4, NoiseSource::Stated),
-        reading_unit: abbe_identify::unit::ReadingUnit::Micrometre,
-        quality: Quality { readings: 1, rms_um: 0.0, heldout_rms_um: 0.0, u_enlargement: 1.0 },
+        unit: abbe_identify::unit::ReadingUnit::Micrometre,
+        fit: ModelFit { readings: 1, rms_um: 0.0, heldout_rms_um: 0.0, u_enlargement: 1.0 },
         ranges: Vec::new(),
         motion_ranges: Vec::new(),
         tool_mm: [0.0; 3],

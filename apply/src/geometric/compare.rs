@@ -11,7 +11,7 @@ use super::{Estimate, Estimator, Method};
 use crate::ApplyError;
 use abbe_identify::IdentifyError;
 use abbe_identify::fit::{self, Fit};
-use abbe_identify::noise::NoiseSource;
+use abbe_identify::noise::ReadingNoise;
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 
@@ -85,10 +85,9 @@ pub struct Comparison {
     pub method: String,
     /// Number of readings in the session.
     pub readings: usize,
-    /// Standard uncertainty of a reading, µm.
-    pub noise_um: f64,
-    /// Source of the noise standard deviation.
-    pub noise_source: NoiseSource,
+    /// The noise of a reading.
+    #[serde(flatten)]
+    pub noise: ReadingNoise,
     /// Residual of the full fit, µm.
     pub rms_um: f64,
     /// Residual of the readings of the method with its estimates, set-ups nominal, µm.
@@ -177,8 +176,7 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
     Ok(Comparison {
         method: method.word().into(),
         readings: problem.readings(),
-        noise_um: problem.noise.sigma_mm * 1e3,
-        noise_source: problem.noise.source,
+        noise: ReadingNoise::of(&problem),
         rms_um: abbe_identify::heldout::rms_mm(&problem, &full.residuals) * 1e3,
         method_rms_um: rms_um(&by_method),
         nominal_rms_um: rms_um(&vec![0.0; list.len()]),

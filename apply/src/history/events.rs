@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::sessions::MachineSessions;
 use abbe_identify::numerics::symmetric::Symmetric;
 use abbe_identify::numerics::tails::chi_square_tail;
+use abbe_identify::results::ParameterChange;
 
 /// A remainder of a change that is less probable than this is a change of its own.
 const SIGNIFICANCE: f64 = 0.001;
@@ -76,19 +77,6 @@ pub struct ChangeEvent {
     pub parameters: Vec<String>,
     /// The change of every parameter.
     pub changes: Vec<ParameterChange>,
-}
-
-/// The change of a parameter.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct ParameterChange {
-    /// The parameter.
-    pub id: String,
-    /// Its change, in `unit`.
-    pub value: f64,
-    /// Standard uncertainty, in `unit`.
-    pub u: f64,
-    /// Unit.
-    pub unit: String,
 }
 
 /// The change of all parameters of a machine.

@@ -5,12 +5,13 @@ use faer::Mat;
 
 use super::HistoryOptions;
 use super::events::{self, Change};
-use super::results::{ChangeResult, Due, Estimate, MachineHistory, ParameterHistory, PointResult};
+use super::results::{ChangeResult, Due, MachineHistory, ParameterHistory, PointResult};
 use super::series::Series;
 use super::sessions::{MachineSessions, SessionValues};
 use super::{DAYS_PER_YEAR, chart};
 use abbe_identify::numerics::regression::Regression;
 use abbe_identify::numerics::symmetric::Symmetric;
+use abbe_identify::results::MeasuredValue;
 
 /// Smallest eigenvalue of a correlation matrix that counts. Below it, parameters of a session are fully correlated.
 const LEAST_EIGENVALUE: f64 = 1e-9;
@@ -60,8 +61,8 @@ struct Joint {
 }
 
 impl Joint {
-    fn estimate(&self, coefficient: usize) -> Estimate {
-        Estimate { value: self.solved.beta[coefficient], u: self.solved.u(&[(coefficient, 1.0)], 1.0) }
+    fn estimate(&self, coefficient: usize) -> MeasuredValue {
+        MeasuredValue { value: self.solved.beta[coefficient], u: self.solved.u(&[(coefficient, 1.0)], 1.0) }
     }
 }
 
@@ -210,8 +211,7 @@ impl<'m> Fitted<'m> {
             Some(ChangeResult {
                 after_days: self.machine.sessions[series.sessions[at - 1]].days,
                 before_days: self.machine.sessions[series.sessions[*at]].days,
-                value: change.value,
-                u: change.u,
+                change,
                 p_value: series.p_value_of_term(change.value, change.u),
             })
         });
@@ -223,7 +223,7 @@ impl<'m> Fitted<'m> {
             points: points.collect(),
             p_value: series.p_value(),
             scatter_ratio: series.scatter,
-            u_enlargement: series.enlargement,
+            enlargement: series.enlargement,
             level: first.map(|(joint, first)| joint.estimate(first)),
             drift_per_year: drift,
             steps: steps.collect(),

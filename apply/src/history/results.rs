@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use abbe_identify::results::MeasuredValue;
 use abbe_identify::results::validation::ValidationVerdict;
 
 use super::DAYS_PER_YEAR;
@@ -75,22 +76,12 @@ pub struct MachineHistory {
 impl MachineHistory {
     /// The amount of a change of a parameter whose own series has the step: that of the series if no other step follows, else
     /// that of the change of all parameters.
-    pub fn amount(&self, change: &ChangeEvent, id: &str) -> Option<Estimate> {
+    pub fn amount(&self, change: &ChangeEvent, id: &str) -> Option<MeasuredValue> {
         let of_series = self.changes.iter().rfind(|one| one.parameters.iter().any(|own| own == id)) == Some(change);
         let step = self.parameters.iter().find(|one| of_series && one.id == id).and_then(|one| one.steps.last());
         let of_all = change.changes.iter().find(|own| own.id == id);
-        step.map(|step| Estimate { value: step.value, u: step.u })
-            .or(of_all.map(|own| Estimate { value: own.value, u: own.u }))
+        step.map(|step| step.change).or(of_all.map(|own| MeasuredValue { value: own.value, u: own.u }))
     }
-}
-
-/// A value with its standard uncertainty.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Estimate {
-    /// Estimate.
-    pub value: f64,
-    /// Standard uncertainty.
-    pub u: f64,
 }
 
 /// A parameter of a machine over time.
@@ -111,11 +102,12 @@ pub struct ParameterHistory {
     pub scatter_ratio: f64,
     /// Factor by which `u` is enlarged: `scatter_ratio` beside the scatter of the other parameters of the machine and of
     /// the other machines, by their degrees of freedom; at least 1.
-    pub u_enlargement: f64,
+    #[serde(rename = "u_enlargement")]
+    pub enlargement: f64,
     /// Level: at the mean date of a series with drift, before the first step; `null` if the model is not separable.
-    pub level: Option<Estimate>,
+    pub level: Option<MeasuredValue>,
     /// Drift per year; `null` without a significant one.
-    pub drift_per_year: Option<Estimate>,
+    pub drift_per_year: Option<MeasuredValue>,
     /// Significant steps.
     pub steps: Vec<ChangeResult>,
     /// Reference of the control charts: the weighted mean of the first sessions after the last step.
@@ -134,12 +126,12 @@ impl ParameterHistory {
         let level = self.level.map_or(0.0, |level| level.value);
         let drift = self.drift_per_year.map_or(0.0, |drift| drift.value);
         let value = |days: f64| {
-            let steps = self.steps.iter().filter(|step| step.before_days <= days).map(|step| step.value);
+            let steps = self.steps.iter().filter(|step| step.before_days <= days).map(|step| step.change.value);
             level + drift * (days - middle) / DAYS_PER_YEAR + steps.sum::<f64>()
         };
         let at = |point: &PointResult| {
             let step = self.steps.iter().find(|step| step.before_days == point.days);
-            let before = step.map(|step| (point.days, value(point.days) - step.value));
+            let before = step.map(|step| (point.days, value(point.days) - step.change.value));
             before.into_iter().chain([(point.days, value(point.days))])
         };
         self.points.iter().flat_map(at).collect()
@@ -176,9 +168,8 @@ pub struct ChangeResult {
     /// Day of the first session after it.
     pub before_days: f64,
     /// The change.
-    pub value: f64,
-    /// Its standard uncertainty.
-    pub u: f64,
+    #[serde(flatten)]
+    pub change: MeasuredValue,
     /// Probability of such a change at this position if there is none.
     pub p_value: f64,
 }

@@ -25,7 +25,7 @@ fn a_large_step_is_no_scatter() {
                 let is_true = |days: f64| (days / 30.4375 - at as f64).abs() < 0.1;
                 let step = parameter.steps.iter().find(|step| is_true(step.before_days));
                 assert!(step.is_some_and(|step| step.p_value < 1e-6), "{parameters} {at}: {parameter:?}");
-                assert!(parameter.u_enlargement < 2.5, "{parameter:?}");
+                assert!(parameter.enlargement < 2.5, "{parameter:?}");
                 further[0] += parameter.steps.len() as u64 - 1 + u64::from(parameter.drift_per_year.is_some());
                 further[1] += 1;
             }
@@ -52,7 +52,7 @@ fn several_steps_are_no_scatter() {
     for parameter in history.machines.iter().flat_map(|machine| &machine.parameters) {
         steps[0] += parameter.steps.len().min(3) as u64;
         steps[1] += 3;
-        assert!(parameter.u_enlargement < 1.3, "{parameter:?}");
+        assert!(parameter.enlargement < 1.3, "{parameter:?}");
     }
     assert!(consistent(steps, true, 0.98), "{steps:?}");
 }

@@ -26,7 +26,7 @@ use super::faults::{Figure, is_third_order};
 use super::path::{Path, length};
 use super::results::{CircularTest, Diagnosis};
 use crate::noise::outliers;
-use crate::results::ParameterResult;
+use crate::results::Estimate;
 
 /// The outliers of a circle: single readings with a large residual of the diagnosis; `None` if there is no diagnosis.
 pub(super) fn reject_outliers(machine: &Machine, path: &Path) -> Option<Vec<bool>> {
@@ -58,7 +58,7 @@ fn report(model: &Decomposition, sigma_mm: f64, result: &mut CircularTest) {
         let beta = &regression.beta[first..first + fault.columns.len()];
         let value = |(id, figure): &(String, Figure)| {
             let (factors, unit) = match figure {
-                Figure::Searched(value, unit) => return ParameterResult::new(id, *value, 0.0, *unit),
+                Figure::Searched(value, unit) => return Estimate::new(id, *value, 0.0, *unit),
                 Figure::Sum(factors, unit) => (factors.clone(), *unit),
                 Figure::Amplitude(cos) => {
                     let amplitude = beta[*cos].hypot(beta[cos + 1]);
@@ -68,9 +68,9 @@ fn report(model: &Decomposition, sigma_mm: f64, result: &mut CircularTest) {
             };
             let value = factors.iter().zip(beta).map(|(factor, beta)| factor * beta).sum();
             let weights: Vec<(usize, f64)> = (first..).zip(factors).collect();
-            ParameterResult::new(id, value, regression.u(&weights, sigma_mm), unit)
+            Estimate::new(id, value, regression.u(&weights, sigma_mm), unit)
         };
-        let meant = |value: ParameterResult| {
+        let meant = |value: Estimate| {
             let meaning = format!("{} of {}: {}", fault.fault, fault.axes, value.id);
             value.with_meaning(meaning)
         };

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::set_up::FigureUncertainties;
-use crate::results::ParameterResult;
+use crate::results::Estimate;
 
 /// Ball-bar figures of a circular test (ISO 230-4).
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -92,7 +92,7 @@ pub struct Diagnosis {
     /// Its estimates. Those of one axis have the sign of the error motion of that axis along R, as the effect of the
     /// same name: `backlash` of X that of `EXX~X:backlash`, `lateral play` that of `EYX~X:backlash`, `straightness`
     /// that of `EYX~X:power2`, `squareness` of X and Y that of `EC0Y`.
-    pub values: Vec<ParameterResult>,
+    pub values: Vec<Estimate>,
     /// Contribution to the path, largest less smallest radius, µm.
     pub circularity_um: f64,
     /// Share of this contribution in the sum over all faults, %.

@@ -30,7 +30,7 @@ use crate::numerics::triangle::Triangle;
 use crate::parameter_description::parameter_meaning;
 use crate::parameters::{Parameter, Role, natural};
 use crate::problem::Problem;
-use crate::results::{BaseResult, ParameterResult};
+use crate::results::{BaseResult, Estimate};
 
 /// Which parameters are held at nominal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -140,6 +140,17 @@ pub fn base_parameters(problem: &Problem, fit: &Fit, gauge: Gauge) -> Result<Bas
     Ok(BaseParameters { held, beta, covariance, held_combinations, null_space, prediction_change_mm })
 }
 
+impl BaseParameters {
+    /// The estimate of a parameter, in its display unit.
+    pub fn estimate(&self, problem: &Problem, parameter: usize) -> Estimate {
+        let known = &problem.parameters.list[parameter];
+        let display = known.unit.display_per_internal;
+        let value = problem.parameters.value(parameter, &self.beta) * display;
+        let u = self.covariance[(parameter, parameter)].max(0.0).sqrt() * display;
+        Estimate::new(&known.id, value, u, &known.unit.name).with_meaning(parameter_meaning(problem, parameter, None))
+    }
+}
+
 /// The base parameters of a fit under [`Gauge::OwnDirection`], in display units.
 ///
 /// # Errors
@@ -147,14 +158,9 @@ pub fn base_parameters(problem: &Problem, fit: &Fit, gauge: Gauge) -> Result<Bas
 pub fn report(problem: &Problem, fit: &Fit) -> Result<BaseResult, IdentifyError> {
     let base = base_parameters(problem, fit, Gauge::OwnDirection)?;
     let list = &problem.parameters.list;
-    let kept = (0..list.len()).filter(|j| !base.held.contains(j)).map(|j| {
-        let display = list[j].unit.display_per_internal;
-        let u = base.covariance[(j, j)].max(0.0).sqrt() * display;
-        ParameterResult::new(&list[j].id, problem.parameters.value(j, &base.beta) * display, u, &list[j].unit.name)
-            .with_meaning(parameter_meaning(problem, j, None))
-    });
+    let kept = (0..list.len()).filter(|j| !base.held.contains(j));
     Ok(BaseResult {
-        parameters: kept.collect(),
+        parameters: kept.map(|j| base.estimate(problem, j)).collect(),
         held_at_nominal: base.held.iter().map(|j| list[*j].id.clone()).collect(),
         combinations_at_nominal: base.held_combinations,
         prediction_change_um: base.prediction_change_mm * 1e3,

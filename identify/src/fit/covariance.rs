@@ -7,11 +7,11 @@ use super::cover::add_to_covariance;
 use super::quantities::{Quantity, quantities, slopes_of_rms, values_at};
 use crate::numerics::rank::Rank;
 use crate::problem::Problem;
-use crate::results::{Covariance, NullSpace, ParameterResult};
+use crate::results::{Covariance, Estimate, NullSpace};
 
 /// Covariance of the reported parameters by the law of propagation of uncertainty, in their order and units. It has the
 /// same factor as the standard uncertainties and covers aliases as they do, so its diagonal holds their squares.
-pub fn of_parameters(problem: &Problem, fit: &Fit, parameters: &[ParameterResult]) -> Covariance {
+pub fn of_parameters(problem: &Problem, fit: &Fit, parameters: &[Estimate]) -> Covariance {
     let list = &problem.parameters.list;
     // Rows of the Jacobian of the reported quantities: their parameters, and the derivative by each.
     let mut rows: Vec<Vec<(usize, f64)>> = Vec::with_capacity(parameters.len());
@@ -58,7 +58,7 @@ pub fn of_parameters(problem: &Problem, fit: &Fit, parameters: &[ParameterResult
 /// Sets the diagonal of a covariance to the squares of the standard uncertainties, and keeps the matrix positive
 /// semidefinite. An additional contribution (competing explanations) is added as uncorrelated. A phase, whose
 /// uncertainty has an upper limit, is scaled.
-fn adapt_diagonal(matrix: &mut Mat<f64>, parameters: &[ParameterResult]) {
+fn adapt_diagonal(matrix: &mut Mat<f64>, parameters: &[Estimate]) {
     for (i, parameter) in parameters.iter().enumerate().take(matrix.nrows()) {
         let variance = parameter.u * parameter.u;
         let present = matrix[(i, i)];
@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn a_covariance_has_the_squares_of_the_uncertainties_on_its_diagonal() {
-        let parameters = [ParameterResult::new("a", 1.0, 2.0, "um"), ParameterResult::new("b", 1.0, 3.0, "um")];
+        let parameters = [Estimate::new("a", 1.0, 2.0, "um"), Estimate::new("b", 1.0, 3.0, "um")];
         let mut matrix = Mat::from_fn(2, 2, |i, j| [[16.0, 4.0], [4.0, 4.0]][i][j]);
         adapt_diagonal(&mut matrix, &parameters);
         assert_eq!((matrix[(0, 0)], matrix[(1, 1)]), (4.0, 9.0));

@@ -17,7 +17,7 @@ use super::Fit;
 use super::aliases::AliasChange;
 use super::quantities::{quantities, u_of_undetermined_phase_deg, values_at};
 use crate::problem::Problem;
-use crate::results::{EnlargedBy, ParameterResult, phases_follow_amplitudes};
+use crate::results::{EnlargedBy, Estimate, phases_follow_amplitudes};
 
 /// Share of an uncertainty without aliases that a change needs to be listed.
 const LISTED: f64 = 0.05;
@@ -99,7 +99,7 @@ pub(crate) fn add_to_covariance(covariance: &mut Mat<f64>, fit: &Fit, values: im
 
 /// Enlarges the uncertainties of reported parameters to cover positions of steps, numbers of shapes and aliases, and states
 /// which alias enlarges which.
-pub(super) fn cover(parameters: &mut [ParameterResult], problem: &Problem, fit: &Fit) {
+pub(super) fn cover(parameters: &mut [Estimate], problem: &Problem, fit: &Fit) {
     if fit.aliases.is_empty() && fit.positions.is_empty() && fit.intervals.is_empty() {
         return;
     }

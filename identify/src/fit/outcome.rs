@@ -16,8 +16,8 @@ use crate::parameters::Role;
 use crate::plausibility::Pulls;
 use crate::problem::Problem;
 use crate::results::{
-    Assumption, AssumptionKind, AssumptionVerdict, DataRange, DeterminedBy, DeterminedByPrior, Goodness,
-    GoodnessVerdict, NotEstimated, NotJudged, Outcome, ParameterResult,
+    Assumption, AssumptionKind, AssumptionVerdict, DataRange, DeterminedBy, DeterminedByPrior, Estimate, Goodness,
+    GoodnessVerdict, NotEstimated, NotJudged, Outcome,
 };
 
 /// χ²/ν below which a residual is significantly below the noise, if it is so by chance in one of a thousand sessions.
@@ -111,7 +111,7 @@ impl Determined {
     }
 
     /// States what determines the estimates of a model, and whether they may be quoted.
-    pub fn mark(&self, problem: &Problem, parameters: &mut [ParameterResult], goodness: Goodness) {
+    pub fn mark(&self, problem: &Problem, parameters: &mut [Estimate], goodness: Goodness) {
         let list = problem.parameters.list.iter();
         let by_prior: Vec<&str> = (list.zip(&self.by))
             .filter(|(_, by)| **by == DeterminedBy::Prior)

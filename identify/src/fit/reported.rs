@@ -11,15 +11,15 @@ use crate::error::IdentifyError;
 use crate::heldout::cross_validation;
 use crate::heldout::{mislabelled_runs, rms_by_unit_mm, rms_mm};
 use crate::identifiability::weak;
-use crate::noise;
 use crate::noise::outliers::firsts_at_reversal;
+use crate::noise::{self, ReadingNoise};
 use crate::numerics::rank::Rank;
 use crate::parameter_description::parameter_meaning;
 use crate::plausibility;
 use crate::positioning::{self, diagonal};
 use crate::problem::Problem;
 use crate::results::{
-    Finding, FitResult, Goodness, ModelResult, OfAngles, Outlier, ParameterResult, Unobservable,
+    Estimate, Finding, FitResult, Goodness, ModelFit, ModelResult, OfAngles, Outlier, Unobservable,
     phases_follow_amplitudes,
 };
 use crate::straightness;
@@ -88,14 +88,15 @@ pub fn model(
     let mut parameters = parameters(problem, fit);
     determined.mark(problem, &mut parameters, goodness);
     Ok(ModelResult {
-        reading_unit: problem.unit(),
+        noise: ReadingNoise::of(problem),
         of_angles,
-        noise_um: problem.noise.sigma_mm * 1e3,
-        noise_source: problem.noise.source,
         noise_ar_coefficients: problem.noise.ar_coefficients.clone(),
-        readings: problem.readings(),
-        rms_um: rms * 1e3,
-        heldout_rms_um: held * 1e3,
+        fit: ModelFit {
+            readings: problem.readings(),
+            rms_um: rms * 1e3,
+            heldout_rms_um: held * 1e3,
+            u_enlargement: fit.u_enlargement,
+        },
         rms_3d_um: in_3d(rms),
         heldout_rms_3d_um: in_3d(held),
         heldout_by: problem.folds.kind.words().to_string(),
@@ -105,7 +106,6 @@ pub fn model(
         chi_square: fit.chi_square,
         degrees_of_freedom: fit.degrees_of_freedom,
         birge_ratio: fit.birge_ratio,
-        u_enlargement: fit.u_enlargement,
         outcome: outcome::outcome(problem, fit, goodness, &determined),
         identifiable: ids(problem, &parameters),
         covariance: covariance::of_parameters(problem, fit, &parameters),
@@ -144,14 +144,14 @@ fn rms_of_units(
 
 /// The identifiable parameters, in display units, with uncertainties that cover aliases and positions of steps. A harmonic
 /// has amplitude and phase of `amplitude · cos(order · angle + phase)`.
-pub fn parameters(problem: &Problem, fit: &Fit) -> Vec<ParameterResult> {
+pub fn parameters(problem: &Problem, fit: &Fit) -> Vec<Estimate> {
     let mut parameters = parameters_of_noise(problem, fit);
     cover::cover(&mut parameters, problem, fit);
     parameters
 }
 
 /// The same with the uncertainties from the noise alone.
-pub(crate) fn parameters_of_noise(problem: &Problem, fit: &Fit) -> Vec<ParameterResult> {
+pub(crate) fn parameters_of_noise(problem: &Problem, fit: &Fit) -> Vec<Estimate> {
     let list = &problem.parameters.list;
     let u_internal = |j: usize| fit.covariance[(j, j)].max(0.0).sqrt() * fit.u_enlargement;
     let mut results = Vec::new();
@@ -164,8 +164,8 @@ pub(crate) fn parameters_of_noise(problem: &Problem, fit: &Fit) -> Vec<Parameter
                 let unit = &list[j].unit;
                 let value = problem.parameters.value(j, &fit.beta) * unit.display_per_internal;
                 let u = u_internal(j) * unit.display_per_internal;
-                let mut result = ParameterResult::new(&list[j].id, value, u, &unit.name)
-                    .with_meaning(parameter_meaning(problem, j, None));
+                let mut result =
+                    Estimate::new(&list[j].id, value, u, &unit.name).with_meaning(parameter_meaning(problem, j, None));
                 let interval = fit.intervals.iter().find(|interval| interval.parameter == j);
                 result.interval_95 =
                     interval.map(|interval| interval.ends.map(|end| value + end * unit.display_per_internal));
@@ -177,7 +177,7 @@ pub(crate) fn parameters_of_noise(problem: &Problem, fit: &Fit) -> Vec<Parameter
 }
 
 /// An estimated position of a step, in the unit of its driver.
-fn position(problem: &Problem, position: &StepPosition) -> ParameterResult {
+fn position(problem: &Problem, position: &StepPosition) -> Estimate {
     let StepPosition { effect: number, step, u, interval_95, .. } = *position;
     let effect = &problem.parameters.effects[number];
     let Unit { name, display_per_internal } = Unit::of_number(&problem.session, effect);
@@ -186,11 +186,11 @@ fn position(problem: &Problem, position: &StepPosition) -> ParameterResult {
     let which = if effect.shape.positions().len() > 1 { format!("position {}", step + 1) } else { "position".into() };
     let meaning = format!("{}, {which}", meaning(&problem.session.machine, effect));
     let interval_95 = interval_95.map(|ends| ends.map(|end| end * display_per_internal));
-    ParameterResult { interval_95, ..ParameterResult::new(&id, value, u, &name).with_meaning(meaning) }
+    Estimate { interval_95, ..Estimate::new(&id, value, u, &name).with_meaning(meaning) }
 }
 
 /// The rms of a spectrum over a period, with the uncertainty by propagation.
-fn rms_of_spectrum(problem: &Problem, fit: &Fit, first: usize, count: usize) -> ParameterResult {
+fn rms_of_spectrum(problem: &Problem, fit: &Fit, first: usize, count: usize) -> Estimate {
     let parameter = &problem.parameters.list[first];
     let own = &fit.beta[first..first + count];
     let rms = rms_of_waves(own);
@@ -200,14 +200,14 @@ fn rms_of_spectrum(problem: &Problem, fit: &Fit, first: usize, count: usize) -> 
     let display = parameter.unit.display_per_internal;
     let u = variance.max(0.0).sqrt() * fit.u_enlargement * display;
     let id = parameter.id.trim_end_matches("cos1");
-    ParameterResult::new(format!("{id}rms"), rms * display, u, &parameter.unit.name).with_meaning(parameter_meaning(
+    Estimate::new(format!("{id}rms"), rms * display, u, &parameter.unit.name).with_meaning(parameter_meaning(
         problem,
         first,
         Some("rms"),
     ))
 }
 
-fn amplitude_and_phase(problem: &Problem, fit: &Fit, j: usize) -> [ParameterResult; 2] {
+fn amplitude_and_phase(problem: &Problem, fit: &Fit, j: usize) -> [Estimate; 2] {
     let id = problem.parameters.list[j].id.trim_end_matches(".cos");
     let (a, b) = (fit.beta[j], fit.beta[j + 1]);
     let cov = |p: usize, q: usize| fit.covariance[(p, q)] * fit.u_enlargement.powi(2);
@@ -224,11 +224,7 @@ fn amplitude_and_phase(problem: &Problem, fit: &Fit, j: usize) -> [ParameterResu
     let display = unit.display_per_internal;
     let u_amplitude = along.max(0.0).sqrt() * display;
     let result = |name: &str, value: f64, u: f64, unit: &str| {
-        ParameterResult::new(format!("{id}.{name}"), value, u, unit).with_meaning(parameter_meaning(
-            problem,
-            j,
-            Some(name),
-        ))
+        Estimate::new(format!("{id}.{name}"), value, u, unit).with_meaning(parameter_meaning(problem, j, Some(name)))
     };
     let mut pair = [
         result("amplitude", amplitude * display, u_amplitude, &unit.name),
@@ -239,7 +235,7 @@ fn amplitude_and_phase(problem: &Problem, fit: &Fit, j: usize) -> [ParameterResu
 }
 
 /// The identifiers of parameters that have a column of the Jacobian: positions of steps have none and count in no rank.
-fn ids(problem: &Problem, parameters: &[ParameterResult]) -> Vec<String> {
+fn ids(problem: &Problem, parameters: &[Estimate]) -> Vec<String> {
     let ids = parameters.iter().map(|parameter| parameter.id.clone());
     ids.filter(|id| !problem.parameters.is_position(id)).collect()
 }

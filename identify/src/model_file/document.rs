@@ -12,8 +12,8 @@ use serde::ser::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
-use super::Quality;
 use crate::noise::NoiseSource;
+use crate::results::ModelFit;
 use crate::unit::ReadingUnit;
 
 /// The word that marks a model file.
@@ -56,7 +56,7 @@ pub struct Document {
     /// The noise of a reading.
     pub noise: Noise,
     /// How well the model describes its own readings.
-    pub fit: Quality,
+    pub fit: ModelFit,
     /// The range of every axis and driver that the readings covered.
     pub ranges: Vec<Range>,
     /// The ranges of each error motion that is a function of the position of its own axis; absent without such errors.

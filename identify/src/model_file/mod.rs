@@ -26,12 +26,10 @@ use abbe_model::effect::Effect;
 use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::Prior;
 use faer::Mat;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 use crate::noise::Noise;
 use crate::parameters::Role;
-use crate::results::{Goodness, GoodnessVerdict};
+use crate::results::{Goodness, GoodnessVerdict, ModelFit, ParameterChange};
 use crate::unit::ReadingUnit;
 use crate::unit::Unit;
 pub use document::{InputFile, MotionRange, Provenance};
@@ -59,19 +57,12 @@ pub struct ModelParameter {
     pub size: f64,
 }
 
-/// How well the model describes its own readings, as the file has it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(rename = "ModelFit")]
-pub struct Quality {
-    /// Number of readings.
-    pub readings: usize,
-    /// Rms of the residual over scalar readings, µm.
-    pub rms_um: f64,
-    /// Rms over held-out scalar readings, µm.
-    pub heldout_rms_um: f64,
-    /// Factor on the uncertainties, which `covariance` contains.
-    pub u_enlargement: f64,
+impl ModelParameter {
+    /// A change by a value with a standard uncertainty, both in internal units.
+    pub fn change(&self, value: f64, u: f64) -> ParameterChange {
+        let display = self.unit.display_per_internal;
+        ParameterChange { id: self.id.clone(), value: value * display, u: u * display, unit: self.unit.name.clone() }
+    }
 }
 
 /// An identified model.
@@ -95,9 +86,9 @@ pub struct IdentifiedModel {
     /// The noise of a reading.
     pub noise: Noise,
     /// The unit of noise and residuals.
-    pub reading_unit: ReadingUnit,
+    pub unit: ReadingUnit,
     /// How well the model describes its own readings.
-    pub quality: Quality,
+    pub fit: ModelFit,
     /// The range of every axis and driver.
     pub ranges: Vec<DriverRange>,
     /// The ranges of the error motions that are functions of the position of their own axis.
@@ -128,7 +119,7 @@ impl IdentifiedModel {
     /// the noise.
     pub fn forbids_decisions(&self) -> Option<&'static str> {
         let exceeds = Goodness::default().with_verdict(GoodnessVerdict::Exceeds).forbids_decisions();
-        exceeds.filter(|_| self.quality.u_enlargement > 1.0)
+        exceeds.filter(|_| self.fit.u_enlargement > 1.0)
     }
 }
 

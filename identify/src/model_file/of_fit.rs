@@ -4,13 +4,14 @@ use abbe_model::component::ErrorName;
 use abbe_model::driver::Reference;
 use abbe_model::session::Session;
 
-use super::{IdentifiedModel, ModelParameter, Provenance, Quality, motion, range};
+use super::{IdentifiedModel, ModelParameter, Provenance, motion, range};
 use crate::error::IdentifyError;
 use crate::fit::base::{Gauge, base_parameters};
 use crate::fit::{Fit, minimum};
 use crate::heldout::stated_rms_mm;
 use crate::parameters::Role;
 use crate::problem::Problem;
+use crate::results::ModelFit;
 
 impl IdentifiedModel {
     /// The model of a fit, in the base parametrisation of [`Gauge::OwnDirection`].
@@ -48,8 +49,8 @@ impl IdentifiedModel {
                 .collect(),
             locations: locations(problem, fit)?,
             noise: problem.noise.clone(),
-            reading_unit: problem.unit(),
-            quality: Quality {
+            unit: problem.unit(),
+            fit: ModelFit {
                 readings: problem.readings(),
                 rms_um: stated_rms_mm(problem, &fit.residuals) * 1e3,
                 heldout_rms_um: stated_rms_mm(problem, &fit.held_out.residuals) * 1e3,

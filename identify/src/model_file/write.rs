@@ -52,7 +52,7 @@ impl IdentifiedModel {
             covariance: Long((0..size).map(|i| Long((0..=i).map(|j| self.covariance[(i, j)]).collect())).collect()),
             null_directions: Long(self.null_directions.iter().cloned().map(Long).collect()),
             locations: Long(self.locations.iter().map(location).collect()),
-            reading_unit: self.reading_unit,
+            reading_unit: self.unit,
             noise: document::Noise {
                 noise_um: Positive(self.noise.sigma_mm * 1e3),
                 source: self.noise.source,
@@ -60,7 +60,7 @@ impl IdentifiedModel {
                 ar_sum_u: self.noise.ar_sum_u,
                 inflation: self.noise.inflation,
             },
-            fit: self.quality,
+            fit: self.fit,
             ranges: self.ranges.iter().map(|range| self.range(range)).collect(),
             motion_ranges: self.motion_ranges.clone(),
             tool_mm: self.tool_mm,

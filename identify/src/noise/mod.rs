@@ -25,6 +25,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::problem::Problem;
+use crate::unit::ReadingUnit;
 pub(crate) use autocorrelation::enlargement_of_mean;
 pub use autocorrelation::{Autocorrelation, Process, along_runs};
 pub(crate) use stated::silent_channels;
@@ -91,6 +92,30 @@ impl NoiseSource {
 impl std::fmt::Display for NoiseSource {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.word())
+    }
+}
+
+/// The noise of one scalar reading, as JSON has it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ReadingNoise {
+    /// The unit of the figures of readings, in which their keys end; absent for µm.
+    #[serde(rename = "reading_unit", default, skip_serializing_if = "ReadingUnit::is_micrometre")]
+    pub unit: ReadingUnit,
+    /// Standard deviation of one scalar reading, µm.
+    #[serde(rename = "noise_um")]
+    pub value: f64,
+    /// Source of `noise_um`: `stated` by session or user, `repeats` or `targets` (readings of the same), `residual` where
+    /// there is none of these, `assumed` without readings. The residual of the declared model also holds what the model
+    /// lacks. Of a validation `model`: the noise of the model's readings where the session has none; the model's held-out
+    /// rms where the model's readings have none either.
+    #[serde(rename = "noise_source")]
+    pub source: NoiseSource,
+}
+
+impl ReadingNoise {
+    /// The noise of a problem.
+    pub fn of(problem: &Problem) -> ReadingNoise {
+        ReadingNoise { unit: problem.unit(), value: problem.noise.sigma_mm * 1e3, source: problem.noise.source }
     }
 }
 

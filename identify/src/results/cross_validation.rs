@@ -1,10 +1,10 @@
 //! Held-out errors, by what is held out, as JSON has them.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Held-out errors of a model, by what is held out. Absent where the readings or the tests do not permit it.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CrossValidation {
     /// For poses: rms of the residual over held-out random poses, µm. It tests interpolation. The effects of `trace`
     /// are those found on all poses.
@@ -33,15 +33,15 @@ pub struct CrossValidation {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_out_test_rms_3d_um: Option<f64>,
     /// The tests that the other tests predict.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub left_out_tests: Vec<String>,
     /// The tests that need parameters that the other tests do not identify.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tests_not_left_out: Vec<TestNotLeftOut>,
 }
 
 /// A test that the other tests do not predict.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TestNotLeftOut {
     /// The test.
     pub test: String,

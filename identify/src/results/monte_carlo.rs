@@ -4,16 +4,14 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::parameter::Interval;
+use crate::monte_carlo::MonteCarlo;
 
 /// A fit by Monte Carlo (JCGM 101).
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct FitMonteCarlo {
-    /// Number of runs.
-    pub runs: u64,
-    /// Seed of the runs.
-    pub seed: u64,
-    /// Coverage probability of the intervals, 0 to 1.
-    pub coverage_probability: f64,
+    /// Runs, seed and coverage probability.
+    #[serde(flatten)]
+    pub draws: MonteCarlo,
     /// Number of runs whose fit did not converge. No figure includes them.
     pub unconverged_runs: u64,
     /// In the order of the fit's parameters.

@@ -131,13 +131,13 @@ impl Goodness {
 }
 
 /// An error that is confounded with set-up parameters and determined by their priors only.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct DeterminedByPrior {
     /// The error.
     pub error: String,
     /// A change of the error and the set-up parameters in this proportion changes no reading. Display units; the error
     /// first.
-    #[serde(serialize_with = "Combination::serialize_pairs")]
+    #[serde(serialize_with = "Combination::serialize_pairs", deserialize_with = "Combination::pairs")]
     #[schemars(with = "Combination")]
     pub combination: Vec<(String, f64)>,
     /// Explanation in words.
@@ -145,7 +145,7 @@ pub struct DeterminedByPrior {
 }
 
 /// A parameter that has no estimate of its own.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NotEstimated {
     /// Identifier.
     pub id: String,
@@ -154,7 +154,7 @@ pub struct NotEstimated {
 }
 
 /// What an assumption is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum AssumptionKind {
     /// The size of the noise and its source.
@@ -168,7 +168,7 @@ pub enum AssumptionKind {
 }
 
 /// What the readings say about an assumption.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum AssumptionVerdict {
     /// They agree with it.
@@ -190,7 +190,7 @@ impl fmt::Display for AssumptionVerdict {
 }
 
 /// Something that a result assumes, and the test of it by the readings.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Assumption {
     /// What it is about.
     pub kind: AssumptionKind,
@@ -203,7 +203,7 @@ pub struct Assumption {
 }
 
 /// The range of the data along an axis.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct DataRange {
     /// The axis.
     pub axis: String,
@@ -214,15 +214,15 @@ pub struct DataRange {
 }
 
 /// What the result of an analysis is worth.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Outcome {
     /// The residual against the noise, and whether estimates may be quoted.
     pub goodness: Goodness,
     /// Errors that are confounded with set-up parameters and determined by the set-up priors only.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub determined_by_prior: Vec<DeterminedByPrior>,
     /// Parameters without an estimate of their own.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub not_estimated: Vec<NotEstimated>,
     /// What the result assumes, each with its test.
     pub assumptions: Vec<Assumption>,

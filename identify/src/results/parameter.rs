@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// Coverage factor of the expanded uncertainty `U = k u` (JCGM 100, 6.2).
 pub(crate) const COVERAGE_FACTOR: f64 = 2.0;
@@ -44,7 +44,7 @@ impl fmt::Display for DeterminedBy {
 }
 
 /// An alias of an effect that enlarges an uncertainty.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EnlargedBy {
     /// The effect.
     pub effect: String,
@@ -55,8 +55,8 @@ pub struct EnlargedBy {
 }
 
 /// A value with its standard uncertainty.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct ParameterResult {
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Estimate {
     /// Identifier: `EY0A`, `bar[A100]`, `EZC~C:h2.amplitude`.
     pub id: String,
     /// Estimate, in `unit`.
@@ -76,7 +76,7 @@ pub struct ParameterResult {
     /// effect.
     pub quotable: bool,
     /// The aliases of effects that enlarge `u`, one for each effect, if any does.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub enlarged_by: Vec<EnlargedBy>,
     /// Standard uncertainty without aliases, in `unit`, if an alias enlarges it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -89,10 +89,10 @@ pub struct ParameterResult {
     pub meaning: String,
 }
 
-impl ParameterResult {
+impl Estimate {
     /// A parameter with the expanded uncertainty and the significance that follow from `value` and `u`.
-    pub fn new(id: impl Into<String>, value: f64, u: f64, unit: impl Into<String>) -> ParameterResult {
-        let mut parameter = ParameterResult {
+    pub fn new(id: impl Into<String>, value: f64, u: f64, unit: impl Into<String>) -> Estimate {
+        let mut parameter = Estimate {
             id: id.into(),
             value,
             u,
@@ -111,8 +111,8 @@ impl ParameterResult {
     }
 
     /// The same with its meaning in words.
-    pub fn with_meaning(self, meaning: impl Into<String>) -> ParameterResult {
-        ParameterResult { meaning: meaning.into(), ..self }
+    pub fn with_meaning(self, meaning: impl Into<String>) -> Estimate {
+        Estimate { meaning: meaning.into(), ..self }
     }
 
     /// Replaces the standard uncertainty, and what follows from it.
@@ -135,8 +135,30 @@ impl ParameterResult {
     }
 }
 
+/// A value with its standard uncertainty.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct MeasuredValue {
+    /// Estimate.
+    pub value: f64,
+    /// Standard uncertainty.
+    pub u: f64,
+}
+
+/// The change of a parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ParameterChange {
+    /// Identifier.
+    pub id: String,
+    /// Its change, in `unit`.
+    pub value: f64,
+    /// Standard uncertainty of the change, in `unit`.
+    pub u: f64,
+    /// Unit of `value` and `u`.
+    pub unit: String,
+}
+
 /// Gives each phase the significance of the amplitude in front of it.
-pub(crate) fn phases_follow_amplitudes(parameters: &mut [ParameterResult]) {
+pub(crate) fn phases_follow_amplitudes(parameters: &mut [Estimate]) {
     for k in 1..parameters.len() {
         if parameters[k].id.ends_with(".phase") && parameters[k - 1].id.ends_with(".amplitude") {
             parameters[k].significant = parameters[k - 1].significant;
@@ -156,7 +178,7 @@ pub enum Finding {
 }
 
 /// A combination of parameters that is not identifiable.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Unobservable {
     /// Coefficient of each parameter, in the parameter's display unit. A change of all parameters in this proportion
     /// changes no reading, or by less than the noise.
@@ -174,6 +196,15 @@ pub struct Unobservable {
 pub struct Combination(BTreeMap<String, f64>);
 
 impl Combination {
+    /// The pairs of an object, in their order.
+    ///
+    /// # Errors
+    /// Those of the deserialiser.
+    pub fn pairs<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<(String, f64)>, D::Error> {
+        let of_object = serde_json::Map::deserialize(deserializer)?.into_iter();
+        Ok(of_object.filter_map(|(id, coefficient)| Some((id, coefficient.as_f64()?))).collect())
+    }
+
     /// Serialises pairs of identifier and coefficient as an object, in their order.
     ///
     /// # Errors
@@ -184,7 +215,7 @@ impl Combination {
 }
 
 /// The null space of the readings in reduced row echelon form.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NullSpace {
     /// The parameters that take part in a null-space direction.
     pub ids: Vec<String>,
@@ -196,7 +227,7 @@ pub struct NullSpace {
 }
 
 /// Covariance matrix of the parameters.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Covariance {
     /// The parameters, in the order of rows and columns: that of `parameters`.
     pub ids: Vec<String>,

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::outcome::{Goodness, TraceVerdict};
-use super::parameter::{DeterminedBy, ParameterResult};
+use super::parameter::{DeterminedBy, Estimate};
 use crate::results::validation::ValidationVerdict;
 use crate::tolerance::rule::Decision;
 
@@ -167,7 +167,7 @@ pub struct Statements<G = GoodStatement, C = AxisCorrection> {
     /// Of a fit and a trace: what else exceeds its expanded uncertainty and is no set-up parameter, the most significant
     /// coefficient of each effect and errors that move no axis line.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub further: Vec<ParameterResult>,
+    pub further: Vec<Estimate>,
     /// What to measure next.
     pub measure: MeasureStatement,
 }

@@ -5,17 +5,17 @@ use std::collections::BTreeMap;
 use abbe_model::document::print::Block;
 use abbe_model::document::test::Test;
 use schemars::JsonSchema;
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
 
 use super::ModelResult;
 use super::outcome::TraceVerdict;
-use super::parameter::ParameterResult;
+use super::parameter::{Estimate, ParameterChange};
 use crate::plausibility::Plausibility;
 use crate::tolerance::Conformity;
 use crate::unit::ReadingUnit;
 
 /// An effect by its keys of session files.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EffectName {
     /// What moves.
     pub component: String,
@@ -24,10 +24,10 @@ pub struct EffectName {
     /// Shape of the dependence.
     pub shape: String,
     /// Order of a harmonic (periods per turn), degree of a polynomial. An integer unless the session states a fraction.
-    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "whole_as_integer")]
+    #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "whole_as_integer")]
     pub order: Option<f64>,
     /// The tests to which the effect is confined; absent for all tests.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tests: Vec<String>,
     /// What the effect is, in words: `C table: axial motion twice per turn`.
     pub meaning: String,
@@ -132,7 +132,7 @@ pub struct AliasResult {
 pub struct EffectResult {
     /// The unit of the figures of readings.
     #[serde(skip)]
-    pub reading_unit: ReadingUnit,
+    pub unit: ReadingUnit,
     /// Component, driver, shape, order.
     #[serde(flatten)]
     pub name: EffectName,
@@ -142,7 +142,7 @@ pub struct EffectResult {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub shape_parameters: Vec<ShapeParameter>,
     /// Its identifiable coefficients. A nonparametric curve may have none. A spectrum has the rms over a period.
-    pub parameters: Vec<ParameterResult>,
+    pub parameters: Vec<Estimate>,
     /// The prior of its coefficients; absent without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prior: Option<PriorResult>,
@@ -266,19 +266,6 @@ pub struct Remainder {
     pub place: Option<String>,
 }
 
-/// A parameter that changed by more than its standard uncertainty between `before` and `after`.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct ChangedParameter {
-    /// The parameter.
-    pub id: String,
-    /// Estimate after less estimate before, in `unit`: the bias by the unmodelled effects.
-    pub change: f64,
-    /// Standard uncertainty after, in `unit`.
-    pub u: f64,
-    /// Unit of `change` and `u`.
-    pub unit: String,
-}
-
 /// Effects that the declared model lacks, and the model before and after they are added.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct TraceResult {
@@ -311,8 +298,9 @@ pub struct TraceResult {
     /// held-out error does not decrease by more than the standard error of the decrease.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rejected_candidates: Vec<RejectedCandidate>,
-    /// Parameters that changed by more than their standard uncertainty.
-    pub changed_parameters: Vec<ChangedParameter>,
+    /// Parameters that changed by more than their standard uncertainty between `before` and `after`, which `u` is: the bias
+    /// by the unmodelled effects.
+    pub changed_parameters: Vec<ParameterChange>,
     /// Number of candidates that were screened.
     pub candidates: usize,
     /// Number of candidates that these readings can detect.

@@ -5,9 +5,8 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::noise::NoiseSource;
-use crate::results::ParameterResult;
-use crate::unit::ReadingUnit;
+use crate::noise::ReadingNoise;
+use crate::results::{Estimate, ParameterChange};
 
 /// The verdict on a saved model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -54,14 +53,9 @@ pub struct ValidationResult {
     pub outside: Vec<String>,
     /// Number of readings excluded as outliers.
     pub outliers: usize,
-    /// Standard deviation of one scalar reading, µm.
-    pub noise_um: f64,
-    /// The unit of the figures of readings, in which their keys end; absent for µm.
-    #[serde(skip_serializing_if = "ReadingUnit::is_micrometre")]
-    pub reading_unit: ReadingUnit,
-    /// Source of `noise_um`: `repeats` or `stated` by the session, or `model`: the noise of the model's readings where
-    /// the session has neither; the model's held-out rms where the model's readings have neither.
-    pub noise_source: NoiseSource,
+    /// The noise of a reading.
+    #[serde(flatten)]
+    pub noise: ReadingNoise,
     /// The machine without errors.
     pub nominal: RmsResult,
     /// Location errors as the model's readings give them without any effect.
@@ -81,7 +75,7 @@ pub struct ValidationResult {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub volumetric_rms_um: Vec<f64>,
     /// The estimated set-up of the session.
-    pub set_up: Vec<ParameterResult>,
+    pub set_up: Vec<Estimate>,
     /// Warnings in words.
     pub warnings: Vec<String>,
 }
@@ -112,9 +106,9 @@ pub struct RmsResult {
     pub noise_ratio: f64,
 }
 
-/// The whole model.
+/// A residual against its prediction.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct ValidatedModel {
+pub struct JudgedResidual {
     /// Residual.
     #[serde(flatten)]
     pub rms: RmsResult,
@@ -128,27 +122,19 @@ pub struct ValidatedModel {
     pub degrees_of_freedom: usize,
     /// Probability of a larger χ² if the model holds.
     pub p_value: f64,
-    /// The readings inside the range, with the set-up that they give; absent if all or none are inside.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub in_range: Option<InRangeResult>,
     /// Share of scalar readings inside their 95 % prediction intervals.
     pub coverage_95: f64,
 }
 
-/// The readings inside the range of the model's data.
+/// The whole model.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct InRangeResult {
-    /// Residual.
+pub struct ValidatedModel {
+    /// All readings.
     #[serde(flatten)]
-    pub rms: RmsResult,
-    /// Rms of the residual as noise and uncertainty of the model predict it, µm.
-    pub predicted_rms_um: f64,
-    /// `√(χ²/ν)`: found over predicted.
-    pub residual_ratio: f64,
-    /// Probability of a larger χ² if the model holds.
-    pub p_value: f64,
-    /// Share of scalar readings inside their 95 % prediction intervals.
-    pub coverage_95: f64,
+    pub residual: JudgedResidual,
+    /// The readings inside the range of the model's data, with the set-up that they give; absent if all or none are inside.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub in_range: Option<JudgedResidual>,
 }
 
 /// The model without one effect.
@@ -164,14 +150,9 @@ pub struct WithoutResult {
 /// A parameter that has changed.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct MovedParameter {
-    /// The parameter.
-    pub id: String,
-    /// Its change since the model, in `unit`.
-    pub value: f64,
-    /// Standard uncertainty of the change, in `unit`.
-    pub u: f64,
-    /// Unit of `value` and `u`.
-    pub unit: String,
+    /// Its change since the model.
+    #[serde(flatten)]
+    pub change: ParameterChange,
     /// Probability of such a change by chance in any parameter of an unchanged machine.
     pub p_value: f64,
     /// Parameters whose change explains these readings nearly as well (χ² larger by less than 4).

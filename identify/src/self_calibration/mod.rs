@@ -46,7 +46,7 @@ pub struct Calibration {
     pub sigma_mm: f64,
     /// Factor on the uncertainties of the solution: `√(χ²/ν)` if the readings scatter significantly more than stated,
     /// else 1.
-    pub u_enlargement: f64,
+    pub enlargement: f64,
     /// The free columns of the equations under the boundary conditions.
     pub free: Vec<usize>,
     /// Source of `sigma_mm`: stated by the session, repeated readings, or the residual of the solution.
@@ -78,7 +78,7 @@ pub fn calibrate(session: &Session) -> Result<Calibration, IdentifyError> {
     let floor = session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
     let enlarged =
         |sigma: f64, of_noise: Option<usize>| crate::fit::u_enlargement(square / sigma.powi(2), freedom, of_noise);
-    let (sigma_mm, u_enlargement, noise_source) = match (stated, of_repeats(session)) {
+    let (sigma_mm, enlargement, noise_source) = match (stated, of_repeats(session)) {
         (Some(sigma), _) => (sigma, enlarged(sigma, None), NoiseSource::Stated),
         (None, Some((sigma, of_noise))) => {
             let sigma = sigma.max(floor).max(LEAST_NOISE_MM);
@@ -92,13 +92,13 @@ pub fn calibrate(session: &Session) -> Result<Calibration, IdentifyError> {
         }
         (None, None) => ((square / freedom).sqrt().max(floor).max(LEAST_NOISE_MM), 1.0, NoiseSource::Residual),
     };
-    let solution = solve(&equations, &reduction, sigma_mm * u_enlargement)?;
+    let solution = solve(&equations, &reduction, sigma_mm * enlargement)?;
     Ok(Calibration {
         rank_before: rank_before(&equations)?,
         conditions,
         solution,
         sigma_mm,
-        u_enlargement,
+        enlargement,
         noise_source,
         free: reduction.free,
         equations,
@@ -141,7 +141,7 @@ impl Calibration {
             &Propagated { calibration: self, turns: self.turns() },
             &monte_carlo::Draws {
                 mean: &vec![0.0; inputs],
-                u: &vec![self.sigma_mm * self.u_enlargement; inputs],
+                u: &vec![self.sigma_mm * self.enlargement; inputs],
                 runs: draws.runs,
                 seed: draws.seed,
                 coverage: draws.coverage,

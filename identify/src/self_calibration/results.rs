@@ -8,9 +8,9 @@ use serde::Serialize;
 use super::position::{self, Position};
 use super::{Calibration, Function, MonteCarlo, Reference};
 use crate::monte_carlo::Distribution;
-use crate::noise::NoiseSource;
+use crate::noise::ReadingNoise;
 use crate::parameter_description::error_meaning;
-use crate::results::{Finding, Interval, ParameterResult, Unobservable};
+use crate::results::{Estimate, Finding, Interval, Unobservable};
 
 /// Bins of a histogram in a report.
 const REPORTED_BINS: usize = 100;
@@ -74,12 +74,9 @@ pub struct DistributionResult {
 /// Monte Carlo of a self-calibration.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct MonteCarloResult {
-    /// Number of runs.
-    pub runs: u64,
-    /// Seed of the runs.
-    pub seed: u64,
-    /// Coverage probability of the intervals, 0 to 1.
-    pub coverage_probability: f64,
+    /// Runs, seed and coverage probability.
+    #[serde(flatten)]
+    pub draws: MonteCarlo,
     /// Distribution of every quantity.
     pub quantities: Vec<DistributionResult>,
 }
@@ -93,10 +90,9 @@ pub struct SelfCalibration {
     pub axis: String,
     /// Number of readings.
     pub readings: usize,
-    /// Standard uncertainty of a reading, µm.
-    pub noise_um: f64,
-    /// Source of `noise_um`: `stated` by the session, `repeats`, or `residual` of the solution.
-    pub noise_source: NoiseSource,
+    /// The noise of a reading.
+    #[serde(flatten)]
+    pub noise: ReadingNoise,
     /// Root mean square of the residual of the solution, µm.
     pub rms_um: f64,
     /// Number of values of all functions.
@@ -113,11 +109,11 @@ pub struct SelfCalibration {
     pub functions: Vec<FunctionResult>,
     /// Deviation of the radius at 0° from the stated one; absent where it is not estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub radius: Option<ParameterResult>,
+    pub radius: Option<Estimate>,
     /// Position errors of the axis from the centre of the least-squares circle.
-    pub parameters: Vec<ParameterResult>,
+    pub parameters: Vec<Estimate>,
     /// Position errors of the axis from the angles of rotation.
-    pub parameters_by_turn: Vec<ParameterResult>,
+    pub parameters_by_turn: Vec<Estimate>,
     /// Radius of the least-squares circle, µm; `null` where the axis gets no position.
     pub circle_radius_um: Option<f64>,
     /// Error motions: the displacements less the rotation about that centre.
@@ -136,7 +132,7 @@ impl Calibration {
     pub fn report(&self, session: &Session, draws: Option<&MonteCarlo>) -> SelfCalibration {
         let axis = session.machine.axes[self.equations.axis].name.clone();
         let mut warnings = session.warnings.clone();
-        warnings.extend(crate::fit::enlargement_warning(self.u_enlargement));
+        warnings.extend(crate::fit::enlargement_warning(self.enlargement));
         if !session.effects.is_empty() {
             warnings.push("self-calibration does not model the declared effects: its functions include them".into());
         }
@@ -167,7 +163,7 @@ impl Calibration {
                         let id = self.location(k, &axis);
                         let meaning = error_meaning(&session.machine, &id);
                         let (value, u) = (position.centres_mm[which][k], position.u_mm[which][k]);
-                        ParameterResult::new(id, value * 1e3, u * 1e3, "um").with_meaning(meaning)
+                        Estimate::new(id, value * 1e3, u * 1e3, "um").with_meaning(meaning)
                     })
                     .collect()
             })
@@ -176,8 +172,7 @@ impl Calibration {
         SelfCalibration {
             method: "self-calibration".into(),
             readings: self.equations.rows.len(),
-            noise_um: self.sigma_mm * 1e3,
-            noise_source: self.noise_source,
+            noise: ReadingNoise { value: self.sigma_mm * 1e3, source: self.noise_source, ..ReadingNoise::default() },
             rms_um: self.solution.rms_mm * 1e3,
             value_count: columns,
             rank_without_conditions: self.rank_before,
@@ -187,7 +182,7 @@ impl Calibration {
             functions: Function::ALL.map(|function| self.function(function, &axis)).to_vec(),
             radius: (self.solution.values_mm.len() > columns && self.solution.identifiable[columns]).then(|| {
                 let value = self.solution.values_mm[columns] * 1e3;
-                ParameterResult::new("radius", value, self.u_mm(columns) * 1e3, "um")
+                Estimate::new("radius", value, self.u_mm(columns) * 1e3, "um")
                     .with_meaning("artefact: deviation of the radius from the stated one")
             }),
             parameters: parameters(0),
@@ -326,7 +321,7 @@ impl Calibration {
             };
             quantities.push(reported(id, distribution));
         }
-        MonteCarloResult { runs: draws.runs, seed: draws.seed, coverage_probability: draws.coverage, quantities }
+        MonteCarloResult { draws: *draws, quantities }
     }
 }
 

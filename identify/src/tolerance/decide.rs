@@ -8,7 +8,7 @@ use super::results::{Conformity, ConformityItem};
 use super::rule::{Decision, Rule};
 use crate::circular::CircularTest;
 use crate::quantity::Given;
-use crate::results::{ModelResult, NotJudged, ParameterResult};
+use crate::results::{Estimate, ModelResult, NotJudged};
 
 /// The decisions about the results of a session; `None` if it states no limits. None is made about a parameter while the
 /// model lacks an effect, or cannot be judged.
@@ -21,7 +21,7 @@ pub fn conformity(session: &Session, model: &ModelResult, circular: &[CircularTe
             let measured = match &limit.of {
                 Toleranced::Parameter(id) => of_parameter(&model.parameters, id),
                 Toleranced::Figure { test, figure, instrument_u_um } => {
-                    figures::measured(session, circular, test, *figure, model.noise_um, *instrument_u_um)
+                    figures::measured(session, circular, test, *figure, model.noise.value, *instrument_u_um)
                 }
             };
             let below_noise =
@@ -48,7 +48,7 @@ pub fn conformity(session: &Session, model: &ModelResult, circular: &[CircularTe
     Some(Conformity { verdict, probability: *probability, items })
 }
 
-fn of_parameter(parameters: &[ParameterResult], id: &str) -> Result<Measured, String> {
+fn of_parameter(parameters: &[Estimate], id: &str) -> Result<Measured, String> {
     let Some(found) = parameters.iter().find(|parameter| parameter.id == id) else {
         return Err(format!("{id} is not identifiable from these readings, or is no parameter of the model"));
     };

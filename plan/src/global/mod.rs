@@ -23,6 +23,7 @@ mod sequence;
 
 use abbe_identify::IdentifyError;
 use abbe_identify::linear::{Linearisation, is_of_interest, prior_u};
+use abbe_identify::noise::ReadingNoise;
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_identify::quantity::Given;
@@ -62,10 +63,9 @@ pub struct GlobalOptions {
 /// Sobol' indices of the estimates of a plan.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct GlobalAnalysis {
-    /// Standard deviation of one scalar reading, µm.
-    pub noise_um: f64,
-    /// Source of `noise_um`: `stated` by session or user, `repeats` or `residual` of its readings, or `assumed`.
-    pub noise_source: abbe_identify::noise::NoiseSource,
+    /// The noise of a reading.
+    #[serde(flatten)]
+    pub noise: ReadingNoise,
     /// Number of samples.
     pub samples: usize,
     /// Number of fits: samples times inputs plus two.
@@ -200,8 +200,7 @@ pub fn global(problem: &Problem, options: &GlobalOptions) -> Result<GlobalAnalys
         }
     });
     Ok(GlobalAnalysis {
-        noise_um: problem.noise.sigma_mm * 1e3,
-        noise_source: problem.noise.source,
+        noise: ReadingNoise::of(problem),
         samples: options.samples,
         evaluations: options.samples * (plan.inputs.len() + 2),
         errors: errors.collect(),

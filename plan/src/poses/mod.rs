@@ -31,7 +31,7 @@ use crate::design::information::SharedParameters;
 use crate::design::{Design, Goal, bound};
 use crate::improve::NamedUncertainty;
 use crate::states;
-use abbe_identify::noise::{Noise, NoiseSource};
+use abbe_identify::noise::{Noise, NoiseSource, ReadingNoise};
 use abbe_identify::numerics::median;
 use abbe_identify::numerics::rank::Rank;
 use abbe_identify::numerics::tolerances::MIN_IDENTIFIABLE;
@@ -91,10 +91,9 @@ pub struct PoseSelection {
     /// them leave an error undetermined.
     #[schemars(with = "Option<f64>")]
     pub random_median: f64,
-    /// Standard deviation of a scalar reading, µm.
-    pub noise_um: f64,
-    /// Source of `noise_um`: `stated` by the session or the user, or `assumed`.
-    pub noise_source: NoiseSource,
+    /// The noise of a reading.
+    #[serde(flatten)]
+    pub noise: ReadingNoise,
     /// Number of candidate poses.
     pub candidates: usize,
     /// Number of drawn poses at which the instrument cannot measure, or that the limits excluded.
@@ -201,8 +200,7 @@ pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Resu
         value: value(&chosen),
         bound: bound::best_value(&design, &chosen),
         random_median: median(&mut values),
-        noise_um: problem.noise.sigma_mm * 1e3,
-        noise_source: problem.noise.source,
+        noise: ReadingNoise::of(&problem),
         candidates: candidates.len(),
         excluded,
         uncertainties: of_targets

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ._errors import Error
 from ._model import Model
 from ._shown import Shown, Table, rows_of
-from .results import FitResult, ParameterResult
+from .results import Estimate, FitResult
 
 if TYPE_CHECKING:
     from ._session import Session
@@ -43,7 +43,7 @@ def by_test(session: Session, of: Callable[[str], NDArray[Any]]) -> ByTest:
     return ByTest(tuple(measured), lambda test: rows_of(of(test), measured[test]))
 
 
-def parameter(parameters: tuple[ParameterResult, ...], id: str) -> ParameterResult:
+def parameter(parameters: tuple[Estimate, ...], id: str) -> Estimate:
     """The parameter of this identifier."""
     for found in parameters:
         if found.id == id:
@@ -62,7 +62,7 @@ class Fit(Shown, FitResult):
     _called = "abbe.Session.fit"
     _inputs: tuple[Session]
 
-    def __getitem__(self, id: str) -> ParameterResult:
+    def __getitem__(self, id: str) -> Estimate:
         return parameter(self.parameters, id)
 
     @property

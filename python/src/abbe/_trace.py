@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ._fit import ByTest, by_test, parameter
 from ._model import Model
 from ._shown import Shown, Table
-from .results import ParameterResult, TraceResult
+from .results import Estimate, TraceResult
 
 if TYPE_CHECKING:
     from ._session import Session
@@ -23,7 +23,7 @@ class Trace(Shown, TraceResult):
     _called = "abbe.Session.trace"
     _inputs: tuple[Session]
 
-    def __getitem__(self, id: str) -> ParameterResult:
+    def __getitem__(self, id: str) -> Estimate:
         of_effects = (estimate for effect in self.effects for estimate in effect.parameters)
         return parameter((*self.after.parameters, *of_effects), id)
 

@@ -6,7 +6,7 @@ use abbe_identify::noise::{Noise as NoiseModel, NoiseSource};
 use abbe_identify::parameters::{Parameter, Role, largest_plausible_share};
 use abbe_identify::problem::Problem;
 use abbe_identify::quantity::Given;
-use abbe_identify::results::{ParameterResult, TraceVerdict};
+use abbe_identify::results::{Estimate, TraceVerdict};
 use abbe_identify::simulate::{Simulation, simulate};
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
@@ -192,14 +192,14 @@ impl Study {
             Analysis::Fit => {
                 let (problem, found) = fit::prepare(session, seed)?;
                 let result = fit::report(&problem, &found)?;
-                draw.rms_um = result.model.rms_um;
+                draw.rms_um = result.model.fit.rms_um;
                 draw.compare(&result.model.parameters, &truth.locations);
             }
             Analysis::Trace => {
                 let options = TraceOptions { seed, ..TraceOptions::default() };
                 let found = trace(session, &options, &|_: Progress| should_continue())?;
                 draw.verdict = Some(found.result.verdict);
-                draw.rms_um = found.result.after.rms_um;
+                draw.rms_um = found.result.after.fit.rms_um;
                 draw.compare(&found.result.after.parameters, &truth.locations);
                 let is_named = |effect: &Effect| truth.effect.as_ref().is_some_and(|own| own.id == effect.id());
                 draw.named = found.effects.iter().any(is_named);
@@ -238,7 +238,7 @@ impl From<IdentifyError> for DrawError {
 
 impl Draw {
     /// Compares estimates with the true values.
-    fn compare(&mut self, parameters: &[ParameterResult], truth: &[Given]) {
+    fn compare(&mut self, parameters: &[Estimate], truth: &[Given]) {
         for truth in truth {
             let Some(found) = parameters.iter().find(|found| found.id == truth.id && found.u > 0.0) else {
                 self.undetermined += 1;

@@ -1,5 +1,6 @@
 //! Horizontal charts with one row per name: values with error bars, and bars.
 
+use abbe::identify::results::MeasuredValue;
 use maud::{Markup, html};
 
 use super::scale::{Placed, Scale, coordinate, span, text};
@@ -14,24 +15,15 @@ const MAX_NAME: usize = 23;
 /// Height of a row, SVG units.
 const ROW: f64 = 21.0;
 
-/// A value with its standard uncertainty.
-#[derive(Clone, Copy, Debug)]
-pub struct Value {
-    /// The value.
-    pub value: f64,
-    /// Standard uncertainty.
-    pub u: f64,
-}
-
 /// A row with up to two values.
 #[derive(Clone, Debug)]
 pub struct Row {
     /// Name.
     pub name: String,
     /// First value.
-    pub before: Option<Value>,
+    pub before: Option<MeasuredValue>,
     /// Second value.
-    pub after: Option<Value>,
+    pub after: Option<MeasuredValue>,
 }
 
 /// Values with whiskers of ± 2 u.
@@ -75,7 +67,7 @@ impl Values {
         self.rows.iter().any(|row| row.before.is_some())
     }
 
-    fn error_bar(&self, x: &Placed, y: f64, value: Value, second: bool) -> Markup {
+    fn error_bar(&self, x: &Placed, y: f64, value: MeasuredValue, second: bool) -> Markup {
         let at = |v: f64| coordinate(x.at(v));
         let (class, label) = if second { ("after", &self.labels[1]) } else { ("before", &self.labels[0]) };
         let [low, high] = [-2.0, 2.0].map(|k| at(value.value + k * value.u));
@@ -121,7 +113,7 @@ impl Kind for Values {
         let rows = self.rows.iter().flat_map(|row| {
             let values = [row.before, row.after].into_iter().zip(&self.labels);
             values.filter_map(|(value, label)| {
-                let Value { value, u } = value?;
+                let MeasuredValue { value, u } = value?;
                 Some(cells![&row.name, label, Cell::exact(value), Cell::exact(u)])
             })
         });

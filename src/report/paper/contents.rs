@@ -105,7 +105,7 @@ pub fn identifiability(study: &Study) -> Part {
             "The structural rank is that of noise-free readings at a generic geometry of the set-up [@bellman1970]. The \
              numerical rank counts the directions that the readings of this plan determine against their noise of {:.2} µm. \
              Singular values are those of the whitened Jacobian, in standard deviations per 1 mm or 0.01 rad.",
-            analysis.noise_um
+            analysis.noise.value
     ));
     report.key(ranks(structure).named("ranks"));
     report.figures(singular_values(structure));

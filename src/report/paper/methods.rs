@@ -15,15 +15,15 @@ pub fn part(study: &Study) -> Part {
     [machine(study), estimation(study), uncertainty(study)].into_iter().for_each(|text| report.key(text));
     if let Some(fitted) = &study.fitted {
         let model = &fitted.result.model;
-        let enlarged = if model.u_enlargement > 1.0 {
+        let enlarged = if model.fit.u_enlargement > 1.0 {
             format!(
                 " The residual exceeds the noise significantly, so that all uncertainties are enlarged by {:.2}.",
-                model.u_enlargement
+                model.fit.u_enlargement
             )
         } else {
             String::new()
         };
-        let source = match model.noise_source {
+        let source = match model.noise.source {
             NoiseSource::Stated => "is that of the instrument",
             NoiseSource::Repeats => "is estimated from repeated readings",
             NoiseSource::Targets => "is estimated from the distances between the targets at each pose",
@@ -41,11 +41,11 @@ pub fn part(study: &Study) -> Part {
         report.key(format!(
             "The fit of {} has a root mean square residual of {} and of {} for held-out readings ({} left out in turn). \
              The noise standard deviation of {} {source}.{along_runs} χ² is {:.0} for {} degrees of freedom (Birge ratio {:.2}).{enlarged}",
-            counted(model.readings, "reading"),
-            of_readings(model.rms_um, model.reading_unit),
-            of_readings(model.heldout_rms_um, model.reading_unit),
+            counted(model.fit.readings, "reading"),
+            of_readings(model.fit.rms_um, model.noise.unit),
+            of_readings(model.fit.heldout_rms_um, model.noise.unit),
             model.heldout_by,
-            of_readings(model.noise_um, model.reading_unit),
+            of_readings(model.noise.value, model.noise.unit),
             model.chi_square,
             model.degrees_of_freedom,
             model.birge_ratio,
@@ -97,6 +97,6 @@ fn uncertainty(study: &Study) -> String {
     format!(
         "The covariance of the estimates follows from the noise of a reading ({}) and from the priors of the set-up by the \
          law of propagation of uncertainty [@jcgm100;@jcgm102]. Stated uncertainties are standard uncertainties.",
-        of_readings(study.analysis.noise_um, study.analysis.reading_unit)
+        of_readings(study.analysis.noise.value, study.analysis.noise.unit)
     )
 }

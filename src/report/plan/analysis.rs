@@ -43,8 +43,8 @@ pub fn report(
         "The model is linearised at the nominal machine and every planned state. The uncertainties follow from the \
          noise ({} per reading, {}) and from the priors of the set-up by the law of propagation of uncertainty (JCGM \
          100, JCGM 102).",
-        of_readings(analysis.noise_um, analysis.reading_unit),
-        analysis.noise_source
+        of_readings(analysis.noise.value, analysis.noise.unit),
+        analysis.noise.source
     );
     report.values = values(analysis);
     let statements = statements::of_plan(&stated.statements, analysis, &problem.session.machine, commands);
@@ -89,7 +89,7 @@ fn extent(analysis: &PlanAnalysis) -> String {
         counted(analysis.readings, "reading"),
         counted(analysis.tests.len(), "test"),
         counted(analysis.setup_count, "set-up"),
-        noise(analysis.noise_um, analysis.reading_unit, analysis.noise_source),
+        noise(analysis.noise),
         analysis.rank,
         analysis.parameter_count
     )
@@ -114,7 +114,7 @@ fn key_figures(problem: &Problem, analysis: &PlanAnalysis) -> Vec<KeyFigure> {
         format!(
             "{}, noise {}",
             counted(problem.tests.len(), "test"),
-            of_readings(analysis.noise_um, analysis.reading_unit)
+            of_readings(analysis.noise.value, analysis.noise.unit)
         ),
     ));
     figures

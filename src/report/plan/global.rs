@@ -1,6 +1,5 @@
 //! Sobol' indices of the estimates of a plan, beside the linear prediction.
 
-use abbe::identify::unit::ReadingUnit;
 use abbe::model::session::Session;
 use abbe::plan::global::GlobalAnalysis;
 
@@ -19,7 +18,7 @@ pub fn report(session: &Session, found: &GlobalAnalysis) -> Report {
         "Sobol' indices by quasi-random samples of the inputs, with the full fit of each sample, beside the \
                      shares by linear propagation."
             .to_string();
-    let noise = noise(found.noise_um, ReadingUnit::Micrometre, found.noise_source);
+    let noise = noise(found.noise);
     report.opening(
         "",
         [format!("{} samples, {} fits, {} inputs, {noise}.", found.samples, found.evaluations, found.inputs.len(),)],

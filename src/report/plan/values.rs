@@ -7,7 +7,7 @@ use crate::report::table::{Cell, Table, cells, numbers, words};
 /// The table of `--csv`.
 pub fn values(analysis: &PlanAnalysis) -> Table {
     let mut rows = Rows(Vec::new());
-    rows.add("plan", "noise", "", analysis.noise_um, analysis.reading_unit.name());
+    rows.add("plan", "noise", "", analysis.noise.value, analysis.noise.unit.name());
     rows.add("plan", "readings", "", analysis.readings as f64, "");
     rows.some("plan", "movement", "", analysis.moving_min, "min");
     for test in &analysis.tests {

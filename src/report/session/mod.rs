@@ -19,7 +19,7 @@ use abbe::identify::IdentifyError;
 use abbe::identify::fit::Fit;
 use abbe::identify::parameters::Role;
 use abbe::identify::problem::Problem;
-use abbe::identify::results::ParameterResult;
+use abbe::identify::results::Estimate;
 use abbe::identify::series::{Cause, correlation};
 use serde_json::json;
 
@@ -34,13 +34,13 @@ use super::number::{unit, value_and_u, with_minus_signs};
 const MAX_CORRELATED: usize = 40;
 
 /// Adds the data of the interactive figures, with one slider per error and effect, and all readings.
-pub fn add_data(report: &mut Report, session: &SessionPlots<'_>, parameters: &[ParameterResult]) {
+pub fn add_data(report: &mut Report, session: &SessionPlots<'_>, parameters: &[Estimate]) {
     let mut data = embed::data(session);
     let sliders: Vec<serde_json::Value> = embed::sliders(session)
         .into_iter()
         .map(|k| {
             let share = &session.series.shares[k];
-            let is_same = |p: &&ParameterResult| {
+            let is_same = |p: &&Estimate| {
                 p.id == share.id || p.id.strip_prefix(&share.id).is_some_and(|rest| rest.starts_with('.'))
             };
             let value = parameters.iter().find(is_same).map(|p| {

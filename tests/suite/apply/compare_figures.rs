@@ -65,12 +65,12 @@ fn check(found: &Comparison, ids: &[&str], delta: &DVector<f64>, covariance: &DM
     assert!((pair.p_value - tail).abs() < 1e-5 * tail + 1e-12, "{} {tail}", pair.p_value);
     let mut p_values = Vec::new();
     for (k, id) in ids.iter().enumerate() {
-        let difference: &Difference = found.differences.iter().find(|difference| difference.id == *id).unwrap();
+        let difference: &Difference = found.differences.iter().find(|difference| difference.change.id == *id).unwrap();
         assert_eq!((difference.from.as_str(), difference.to.as_str()), ("before", "after"));
         let u = covariance[(k, k)].sqrt();
-        near(difference.value, delta[k], &format!("the difference of {id}"));
-        near(difference.u, u, &format!("u of {id}"));
-        assert_eq!(difference.unit, if display(id) == 1e3 { "um" } else { "arcsec" });
+        near(difference.change.value, delta[k], &format!("the difference of {id}"));
+        near(difference.change.u, u, &format!("u of {id}"));
+        assert_eq!(difference.change.unit, if display(id) == 1e3 { "um" } else { "arcsec" });
         let p = 2.0 * Normal::standard().sf((delta[k] / u).abs());
         assert!((difference.p_value - p).abs() < 1e-4 * p + 1e-12, "{id}: {} {p}", difference.p_value);
         p_values.push(p);
@@ -80,7 +80,7 @@ fn check(found: &Comparison, ids: &[&str], delta: &DVector<f64>, covariance: &DM
     let count = p_values.iter().enumerate().take_while(|(k, p)| *p * (ids.len() - k) as f64 <= 0.05).count();
     assert_eq!(pair.significant, count);
     for (k, difference) in found.differences.iter().enumerate() {
-        assert_eq!(difference.significant, k < count, "{}", difference.id);
+        assert_eq!(difference.significant, k < count, "{}", difference.change.id);
     }
 }
 
@@ -120,7 +120,7 @@ fn a_common_bar_enters_the_difference_once() {
     let mut a = model(&plan, true, &[("EX0C", 10.0), ("bar[A]", 0.4), ("bar[C]", -0.5)], 3);
     let mut b = model(&plan, true, &[("EX0C", 10.9), ("bar[A]", 0.4), ("bar[C]", -0.5)], 4);
     for (model, factor) in [(&mut a, 1.5), (&mut b, 1.2)] {
-        model.quality.u_enlargement = factor;
+        model.fit.u_enlargement = factor;
         model.covariance = &model.covariance * faer::Scale(factor * factor);
     }
     let found = compared(&a, &b, None, 0);
@@ -159,7 +159,7 @@ fn a_bar_that_is_another_has_the_difference_of_the_readings_alone() {
     let plan = plan("[\"EX0C\", \"EY0C\", \"EB0C\"]", "");
     let a = model(&plan, true, &[("bar[A]", 0.4), ("bar[C]", -0.5)], 5);
     let mut b = model(&plan, true, &[("bar[A]", 3.4), ("bar[C]", -0.5)], 6);
-    b.quality.u_enlargement = 1.3;
+    b.fit.u_enlargement = 1.3;
     b.covariance = &b.covariance * faer::Scale(1.69);
     let found = compared(&a, &b, None, 0);
     assert!(found.pairs[0].shared_setup.is_empty());
@@ -169,15 +169,15 @@ fn a_bar_that_is_another_has_the_difference_of_the_readings_alone() {
         (value(model, id) / variance * of_readings, of_readings)
     };
     for (id, refuted) in [("bar[A]", true), ("bar[C]", false)] {
-        let one = found.pairs[0].not_shared.iter().find(|one| one.id == id).unwrap();
+        let one = found.pairs[0].not_shared.iter().find(|one| one.change.id == id).unwrap();
         let ((of_a, variance_a), (of_b, variance_b)) = (alone(&a, id, 0.7), alone(&b, id, 0.7 * 1.3));
         let u = (variance_a + variance_b).sqrt();
-        near(one.value, of_b - of_a, &format!("the difference of {id}"));
-        near(one.u, u, &format!("u of {id}"));
+        near(one.change.value, of_b - of_a, &format!("the difference of {id}"));
+        near(one.change.u, u, &format!("u of {id}"));
         let p = 2.0 * Normal::standard().sf(((of_b - of_a) / u).abs());
         assert!((one.p_value - p).abs() < 1e-4 * p + 1e-9, "{id}: {} {p}", one.p_value);
-        assert_eq!((one.unit.as_str(), one.refuted), ("um", refuted), "{id}");
-        println!("{id}: {:.3} ± {:.3} µm, p {:.2e}", one.value, one.u, one.p_value);
+        assert_eq!((one.change.unit.as_str(), one.refuted), ("um", refuted), "{id}");
+        println!("{id}: {:.3} ± {:.3} µm, p {:.2e}", one.change.value, one.change.u, one.p_value);
     }
     let delta = DVector::from_iterator(3, ids.iter().map(|id| value(&b, id) - value(&a, id)));
     check(&found, &ids, &delta, &(block(&a, &ids) + block(&b, &ids)));
@@ -274,15 +274,15 @@ fn a_bar_of_which_the_readings_say_nothing_has_no_difference_of_its_own() {
         let u = [1e-3, 1e-4, 0.9999 * prior];
         model.covariance = faer::Mat::from_fn(3, 3, |i, j| if i == j { u[i] * u[i] } else { 0.0 });
         model.null_directions = Vec::new();
-        model.quality.u_enlargement = 1.0;
+        model.fit.u_enlargement = 1.0;
         model
     };
     let found = compared(&of(0.0), &of(1e-3), None, 0);
     assert!(found.pairs[0].shared_setup.is_empty(), "{:?}", found.pairs[0].shared_setup);
-    let named: Vec<&str> = found.pairs[0].not_shared.iter().map(|one| one.id.as_str()).collect();
+    let named: Vec<&str> = found.pairs[0].not_shared.iter().map(|one| one.change.id.as_str()).collect();
     assert_eq!(named, ["bar[A]"]);
     // 1 µm over √2·0.1 µm, each with the prior of 0.7 µm taken out.
     let alone = 1.0 / (1.0 - (0.1_f64 / 0.7).powi(2));
-    near(found.pairs[0].not_shared[0].value, alone, "the difference");
-    near(found.pairs[0].not_shared[0].u, 0.1 * (2.0 * alone).sqrt(), "its u");
+    near(found.pairs[0].not_shared[0].change.value, alone, "the difference");
+    near(found.pairs[0].not_shared[0].change.u, 0.1 * (2.0 * alone).sqrt(), "its u");
 }

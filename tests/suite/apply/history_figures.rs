@@ -142,7 +142,7 @@ fn figures_of_parameters_follow_from_least_squares() {
     let terms = found_terms(&machine, found);
     assert!(terms[1].drift && terms[1].steps.is_empty() && !terms[2].drift && terms[2].steps == [STEP]);
     assert!(!terms[3].drift && terms[3].steps.is_empty());
-    let factors: Vec<f64> = found.parameters.iter().map(|one| one.u_enlargement).collect();
+    let factors: Vec<f64> = found.parameters.iter().map(|one| one.enlargement).collect();
     assert!(factors.iter().all(|factor| (1.2..2.2).contains(factor)), "{factors:?}");
     let (values, covariance) = least_squares(&machine, &terms, &factors);
     let mut place = 0;
@@ -171,8 +171,8 @@ fn figures_of_parameters_follow_from_least_squares() {
         }
         for step in &one.steps {
             let (value, u) = term();
-            near(step.value, value, &what("step"));
-            near(step.u, u, &what("u of the step"));
+            near(step.change.value, value, &what("step"));
+            near(step.change.u, u, &what("u of the step"));
             assert_eq!(step.before_days, day(STEP));
             assert_eq!(step.after_days, day(STEP - 1));
             // The freedom is that of the series and of its prior.
@@ -202,7 +202,7 @@ fn check_line(machine: &MachineSessions, one: &ParameterHistory, k: usize, terms
     for (session, point) in machine.sessions.iter().enumerate().filter(|(_, session)| session.values[k].is_some()) {
         let drift = one.drift_per_year.map_or(0.0, |drift| drift.value) * (point.days - mean_day(machine, k)) / YEAR;
         let steps = |until: usize| -> f64 {
-            one.steps.iter().zip(&terms.steps).filter(|(_, at)| **at <= until).map(|(step, _)| step.value).sum()
+            one.steps.iter().zip(&terms.steps).filter(|(_, at)| **at <= until).map(|(step, _)| step.change.value).sum()
         };
         let mut values = vec![steps(session)];
         if terms.steps.contains(&session) {
@@ -225,7 +225,7 @@ fn check_points(machine: &MachineSessions, one: &ParameterHistory, k: usize, ter
     let mut bounds = vec![0];
     bounds.extend(terms.steps.iter().map(|step| present.iter().position(|session| session == step).unwrap()));
     bounds.push(present.len());
-    let u: Vec<f64> = present.iter().map(|session| u(k, *session) * one.u_enlargement).collect();
+    let u: Vec<f64> = present.iter().map(|session| u(k, *session) * one.enlargement).collect();
     for (point, (session, u)) in one.points.iter().zip(present.iter().zip(&u)) {
         let (value, _) = machine.sessions[*session].values[k].unwrap();
         assert_eq!((point.days, point.value), (day(*session), value));
@@ -287,7 +287,7 @@ fn check_due(machine: &MachineSessions, one: &ParameterHistory, k: usize, terms:
     let (_, _, sum, freedom) = alone(terms.drift);
     near(one.scatter_ratio, (sum / freedom as f64).sqrt(), "the scatter");
     let (beta, inverse, ..) = alone(true);
-    let rate = if terms.drift { beta[1].abs() } else { one.u_enlargement * inverse[(1, 1)].sqrt() };
+    let rate = if terms.drift { beta[1].abs() } else { one.enlargement * inverse[(1, 1)].sqrt() };
     let mut u: Vec<f64> = one.points.iter().map(|point| point.u).collect();
     u.sort_by(f64::total_cmp);
     let years = 3.0 * u[u.len() / 2] / rate;
@@ -301,7 +301,7 @@ fn check_due(machine: &MachineSessions, one: &ParameterHistory, k: usize, terms:
 /// The change of all parameters at the step, its covariance, and the values before it.
 fn change(machine: &MachineSessions, found: &MachineHistory) -> (DVector<f64>, DMatrix<f64>, DVector<f64>) {
     let mut terms = found_terms(machine, found);
-    let factors: Vec<f64> = found.parameters.iter().map(|one| one.u_enlargement).collect();
+    let factors: Vec<f64> = found.parameters.iter().map(|one| one.enlargement).collect();
     terms.iter_mut().for_each(|terms| terms.steps = vec![STEP]);
     let (values, covariance) = least_squares(machine, &terms, &factors);
     let places: Vec<usize> = (0..4)

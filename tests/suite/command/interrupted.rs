@@ -255,7 +255,7 @@ fn a_trace_can_be_interrupted_anywhere() {
         // The session states its noise of 0.3 µm; the residual is 0.55 µm until the effect is found.
         let found_it = ids(&found) == ["EZC~C:h2"];
         assert!(found_it || found.effects.is_empty(), "{:?}", ids(&found));
-        assert_eq!(result.after.rms_um < 0.31, found_it, "{until}: {}", result.after.rms_um);
+        assert_eq!(result.after.fit.rms_um < 0.31, found_it, "{until}: {}", result.after.fit.rms_um);
         effects.push(found.effects.len());
     }
     assert!(effects.is_sorted() && effects.contains(&0) && effects.contains(&1), "{effects:?}");

@@ -7,6 +7,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use abbe::fleet::record::Record;
 use serde_json::Value;
 
 use crate::suite::abbe;
@@ -136,6 +137,10 @@ fn every_record_is_described_by_its_schema() {
         assert!(faults.is_empty(), "{name}: {faults:?}");
         assert_eq!(name, format!("{}/{}.json", &record["key"].as_str().unwrap()[..2], record["key"].as_str().unwrap()));
         assert_eq!(record["tool_version"], abbe::fleet::BUILD);
+        // Nothing is lost where a history reads it again.
+        let read: Record = serde_json::from_str(&contents).unwrap();
+        assert_eq!(serde_json::to_value(&read).unwrap(), record);
+        assert_eq!(record["model"].is_null(), !record["error"].is_null());
     }
 }
 

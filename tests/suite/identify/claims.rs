@@ -36,10 +36,10 @@ fn assert_consistent(result: &TraceResult, what: &str) {
     assert!(!(complete && result.remainder.structured), "{what}");
     if found {
         assert_ne!(result.residual_before, "no structure beyond noise", "{what}");
-        let (before, after) = (result.before.heldout_rms_um, result.after.heldout_rms_um);
+        let (before, after) = (result.before.fit.heldout_rms_um, result.after.fit.heldout_rms_um);
         assert!(after < before, "{what}: {before} {after}");
     } else {
-        let (before, after) = (result.before.heldout_rms_um, result.after.heldout_rms_um);
+        let (before, after) = (result.before.fit.heldout_rms_um, result.after.fit.heldout_rms_um);
         assert!((after / before - 1.0).abs() < 1e-9, "{what}: {before} {after}");
     }
     for rejected in &result.rejected_candidates {
@@ -108,8 +108,8 @@ fn a_stated_noise_that_repeats_contradict_gives_no_claim() {
         session.noise_mm = Some(1e-3 * stated_um);
         let result = traced(&session, TraceOptions::default().significance);
         assert!(result.effects.is_empty(), "{stated_um}: {:?}", result.effects);
-        assert_eq!(result.after.noise_source, NoiseSource::Repeats, "{stated_um}");
-        assert!((result.after.noise_um / 0.3 - 1.0).abs() < 0.3, "{stated_um}: {}", result.after.noise_um);
+        assert_eq!(result.after.noise.source, NoiseSource::Repeats, "{stated_um}");
+        assert!((result.after.noise.value / 0.3 - 1.0).abs() < 0.3, "{stated_um}: {}", result.after.noise.value);
     }
 }
 
@@ -126,7 +126,7 @@ fn a_warm_up_in_one_run_is_an_effect_and_no_slow_noise() {
     let found: Vec<&EffectName> = result.effects.iter().map(|effect| &effect.name).collect();
     let [name] = found.as_slice() else { panic!("{found:?}") };
     assert_eq!([&name.component, &name.driver, &name.shape], ["EC0Y", "time", "warmup"]);
-    assert!((result.after.noise_um / 0.3 - 1.0).abs() < 0.1, "{}", result.after.noise_um);
+    assert!((result.after.noise.value / 0.3 - 1.0).abs() < 0.1, "{}", result.after.noise.value);
     assert_consistent(&result, "a warm-up");
 }
 

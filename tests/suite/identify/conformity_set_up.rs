@@ -7,6 +7,7 @@ use std::f64::consts::TAU;
 use abbe::files::read::add_node;
 use abbe::files::table::memory::MemoryColumn;
 use abbe::identify::circular::{CircularTest, of_session};
+use abbe::identify::noise::ReadingNoise;
 use abbe::identify::tolerance::rule::Decision;
 use abbe::identify::tolerance::{ConformityItem, conformity};
 use abbe::model::chain::Machine;
@@ -67,7 +68,8 @@ fn decided(session: &mut Session, figure: TestFigure, lower: f64, upper: f64, no
     let limits = vec![Limit { of, lower: Some(lower), upper, unit: "um" }];
     session.tolerance = Some(Tolerance { probability: 0.95, limits });
     let goodness = Goodness::default().with_verdict(GoodnessVerdict::Agrees);
-    let model = ModelResult { noise_um, outcome: Outcome { goodness, ..Outcome::default() }, ..ModelResult::default() };
+    let noise = ReadingNoise { value: noise_um, ..ReadingNoise::default() };
+    let model = ModelResult { noise, outcome: Outcome { goodness, ..Outcome::default() }, ..ModelResult::default() };
     conformity(session, &model, &figures(session)).unwrap().items.remove(0)
 }
 

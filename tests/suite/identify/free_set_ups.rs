@@ -298,8 +298,8 @@ fn a_noise_that_is_not_stated_is_that_of_repeats_or_of_the_residual() {
         session.noise_mm = None;
         session.resolution_mm = None;
         let found = fitted(&session).unwrap();
-        assert_eq!(found.model.noise_source, source);
-        assert!((found.model.noise_um / 0.3 - 1.0).abs() < 0.06, "{file}: {}", found.model.noise_um);
+        assert_eq!(found.model.noise.source, source);
+        assert!((found.model.noise.value / 0.3 - 1.0).abs() < 0.06, "{file}: {}", found.model.noise.value);
         for (own, expected) in found.model.parameters.iter().zip(&stated.model.parameters) {
             assert_eq!(own.id, expected.id);
             let apart = (own.value - expected.value).abs();

@@ -65,10 +65,10 @@ fn the_right_component_predicts_a_left_out_radius_and_its_alias_does_not() {
         let one = Session { tests: vec![test.clone()], ..session.clone() };
         let [axial, tilt] = [("EZC", 2.0), ("EAC", 1.0)].map(|(component, order)| fitted(&one, component, order));
         assert!(
-            axial.model.rms_um < 0.32 && tilt.model.rms_um < 1.02 * axial.model.rms_um,
+            axial.model.fit.rms_um < 0.32 && tilt.model.fit.rms_um < 1.02 * axial.model.fit.rms_um,
             "{} {}",
-            axial.model.rms_um,
-            tilt.model.rms_um
+            axial.model.fit.rms_um,
+            tilt.model.fit.rms_um
         );
         assert_eq!(axial.model.cross_validation.left_out_test_rms_um, None);
     }
@@ -80,7 +80,7 @@ fn the_right_component_predicts_a_left_out_radius_and_its_alias_does_not() {
             "{:?}",
             result.model.cross_validation
         );
-        assert_eq!(result.model.cross_validation.left_out_run_rms_um, Some(result.model.heldout_rms_um));
+        assert_eq!(result.model.cross_validation.left_out_run_rms_um, Some(result.model.fit.heldout_rms_um));
         assert_eq!(result.model.cross_validation.extrapolation_rms_um, None);
     }
     let [axial, tilt] = [axial, tilt].map(|result| result.model.cross_validation.left_out_test_rms_um.unwrap());

@@ -22,7 +22,7 @@ fn session(contents: &str) -> Session {
     session
 }
 
-fn measured(plan: &Session, simulation: &Simulation) -> (Session, Vec<(String, f64, String)>) {
+fn measured(plan: &Session, simulation: &Simulation) -> (Session, Vec<Given>) {
     let simulated = simulate(plan, simulation).unwrap();
     (plan.clone().with_readings(simulated.readings), simulated.truth)
 }

@@ -35,7 +35,7 @@ fn given() -> Vec<Given> {
 }
 
 /// The session with simulated readings, and the simulated values.
-fn measured(plan: &Session, simulation: &Simulation) -> (Session, Vec<(String, f64, String)>) {
+fn measured(plan: &Session, simulation: &Simulation) -> (Session, Vec<Given>) {
     let simulated = simulate(plan, simulation).unwrap();
     assert!(simulated.warnings.is_empty(), "{:?}", simulated.warnings);
     (plan.clone().with_readings(simulated.readings), simulated.truth)
@@ -61,7 +61,7 @@ fn without_noise_the_errors_of_the_thesis_are_recovered_exactly() {
         let (problem, fit) = prepare(&session, 1).unwrap();
         let mut worst = 0.0_f64;
         for id in ISO {
-            let (_, value, unit) = truth.iter().find(|(known, ..)| known == id).unwrap();
+            let Given { value, unit, .. } = truth.iter().find(|known| known.id == *id).unwrap();
             let (estimate, _) = found(&problem, &fit, id);
             worst = worst.max((estimate - value).abs());
             assert!((estimate - value).abs() < 1e-6, "{chapter} {id}: {estimate} for {value} {unit}");
@@ -89,7 +89,7 @@ fn pulls_have_mean_0_and_standard_deviation_1_over_200_draws() {
             assert!(list.iter().filter(|p| matches!(p.prior, Prior::Gaussian(_))).count() == 19);
             list.iter()
                 .map(|parameter| {
-                    let (_, value, _) = truth.iter().find(|(id, ..)| *id == parameter.id).unwrap();
+                    let Given { value, .. } = truth.iter().find(|known| known.id == parameter.id).unwrap();
                     let (estimate, u) = found(&problem, &fit, &parameter.id);
                     (estimate - value) / u
                 })

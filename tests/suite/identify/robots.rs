@@ -26,7 +26,7 @@ fn fitted(session: &Session) -> FitResult {
 /// Rms length of the vector over held-out blocks of joint space and over held-out random poses, mm. The first decides.
 fn held_out(result: &FitResult) -> [f64; 2] {
     let model = &result.model.cross_validation;
-    assert_eq!(result.model.heldout_rms_um, model.extrapolation_rms_um.unwrap());
+    assert_eq!(result.model.fit.heldout_rms_um, model.extrapolation_rms_um.unwrap());
     let ratio = result.model.heldout_rms_3d_um.unwrap() / model.extrapolation_rms_3d_um.unwrap();
     assert!((ratio - 1.0).abs() < 1e-12, "{ratio}");
     [model.extrapolation_rms_3d_um, model.interpolation_rms_3d_um].map(|um| um.unwrap() * 1e-3)
@@ -123,7 +123,7 @@ fn views_of_the_workspace_hold_every_pose() {
         for view in &found {
             assert_eq!(view.unit, unit);
             let poses: usize = view.cells.iter().map(|cell| cell.readings).sum();
-            assert_eq!(poses, result.model.readings);
+            assert_eq!(poses, result.model.fit.readings);
             let squares: f64 = view.cells.iter().map(|cell| cell.readings as f64 * cell.after * cell.after).sum();
             let ratio = (squares / poses as f64).sqrt() / result.model.rms_3d_um.unwrap();
             println!("{:?}: {poses} poses in {} cells, rms ratio {ratio}", view.names, view.cells.len());

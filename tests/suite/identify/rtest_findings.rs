@@ -102,7 +102,7 @@ fn traced<T>(session: &Session, examine: impl FnOnce(&TraceOutcome) -> T) -> T {
     let result = &outcome.result;
     println!(
         "{}: {:.3} µm before, {:.3} after, {:.3} held out",
-        result.verdict, result.before.rms_um, result.after.rms_um, result.after.heldout_rms_um
+        result.verdict, result.before.fit.rms_um, result.after.fit.rms_um, result.after.fit.heldout_rms_um
     );
     for effect in &result.effects {
         println!("  {:?} {:?}", effect.name, effect.parameters);
@@ -150,7 +150,7 @@ fn steps_of_pitch_compensation_are_found_in_x_and_in_y() {
         let y = furthest(&staircase(outcome, "EYY").unwrap(), &pairs(&Y_STEPS_MM, &Y_HEIGHTS_UM));
         println!("staircases within {x:.2} µm in X and {y:.2} µm in Y");
         assert!(x < 0.5 && y < 0.5, "{x} {y}");
-        assert!(outcome.result.after.heldout_rms_um < 0.32);
+        assert!(outcome.result.after.fit.heldout_rms_um < 0.32);
     });
 }
 
@@ -227,7 +227,7 @@ fn squareness_and_cyclic_straightness_of_y_are_found_in_bk1() {
             let [amplitude, phase] = [0, 1].map(|k| &harmonic.parameters[k]);
             assert!((amplitude.value - 1.5).abs() < 4.0 * amplitude.u, "{amplitude:?}");
             assert!((phase.value - 40.0).abs() < 4.0 * phase.u, "{phase:?}");
-            assert!(result.after.heldout_rms_um < 0.32, "{}", result.after.heldout_rms_um);
+            assert!(result.after.fit.heldout_rms_um < 0.32, "{}", result.after.fit.heldout_rms_um);
         });
     }
 }

@@ -377,7 +377,7 @@ fn distributions_are_reported_with_their_quantities() {
         let calibration = calibrate(&session).unwrap();
         let report = calibration.report(&session, Some(&draws));
         let found = report.monte_carlo.unwrap();
-        assert_eq!((found.runs, found.seed, found.coverage_probability), (20_000, 4, 0.95));
+        assert_eq!((found.draws.runs, found.draws.seed, found.draws.coverage), (20_000, 4, 0.95));
         let drawn = calibration.monte_carlo(&draws);
         let ids: Vec<&str> = found.quantities.iter().map(|quantity| quantity.id.as_str()).collect();
         let positions: Vec<String> = report.parameters.iter().map(|parameter| parameter.id.clone()).collect();

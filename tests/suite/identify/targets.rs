@@ -127,7 +127,7 @@ fn as_many_parameters_as_readings_leave_no_degrees_of_freedom() {
     for noise_mm in [None, Some(NOISE_MM)] {
         let session = Session { noise_mm, ..session_of(3, 5, &TARGETS[..1], [0.0; 2]) };
         let found = fitted(&session);
-        assert_eq!((found.model.readings, found.model.rank, found.model.degrees_of_freedom), (3, 9, 0));
+        assert_eq!((found.model.fit.readings, found.model.rank, found.model.degrees_of_freedom), (3, 9, 0));
         let goodness = found.model.outcome.goodness;
         assert_eq!(goodness.verdict, GoodnessVerdict::NotJudged);
         assert_eq!(goodness.not_judged, Some(NotJudged::NoDegreesOfFreedom));
@@ -147,20 +147,20 @@ fn three_reflectors_give_the_noise_and_judge_the_model() {
     let (mut mean, mut inside, mut agree, mut exceed) = (0.0, 0, 0, 0);
     for seed in 0..SETS {
         let clean = fitted(&session(seed, &TARGETS, 0.0));
-        assert_eq!(clean.model.noise_source, NoiseSource::Targets);
-        let ratio = (clean.model.noise_um * 1e-3 / NOISE_MM).powi(2);
+        assert_eq!(clean.model.noise.source, NoiseSource::Targets);
+        let ratio = (clean.model.noise.value * 1e-3 / NOISE_MM).powi(2);
         mean += ratio / SETS as f64;
         // χ² is nearly normal with so many degrees of freedom.
         inside += u64::from((ratio - 1.0).abs() < 1.96 * (2.0 / freedom).sqrt());
         agree += u64::from(clean.model.outcome.goodness.verdict == GoodnessVerdict::Agrees);
         if seed % 10 == 0 {
             let eccentric = fitted(&session(seed, &TARGETS, ECCENTRIC));
-            assert_eq!(eccentric.model.noise_source, NoiseSource::Targets);
+            assert_eq!(eccentric.model.noise.source, NoiseSource::Targets);
             exceed += u64::from(eccentric.model.outcome.goodness.verdict == GoodnessVerdict::Exceeds);
             assert!(
-                (eccentric.model.noise_um / clean.model.noise_um - 1.0).abs() < 0.01,
+                (eccentric.model.noise.value / clean.model.noise.value - 1.0).abs() < 0.01,
                 "{}",
-                eccentric.model.noise_um
+                eccentric.model.noise.value
             );
         }
     }
@@ -184,7 +184,7 @@ fn a_trace_is_judged_by_the_noise_of_three_reflectors() {
         };
         let names: Vec<String> = result.effects.iter().map(name).collect();
         println!("{seed}, {eccentric}: {:?} {names:?} p = {:.3}", result.verdict, result.remainder.p_value);
-        (result.verdict, names, result.after.noise_source)
+        (result.verdict, names, result.after.noise.source)
     };
     let (mut clean, mut explained) = (0, 0);
     for seed in 0..SETS {
@@ -215,11 +215,12 @@ fn one_shift_of_a_joint_is_one_change() {
     let pair = &found.pairs[0];
     println!("{:#?}", pair.single_changes);
     assert!(pair.judged && pair.significant > 0, "{pair:?}");
-    let best = &pair.single_changes[0];
+    let probability = pair.single_changes[0].probability;
+    let best = &pair.single_changes[0].change;
     assert_eq!(best.id, "EX0J5");
     assert!((best.value - 1e3 * shift_mm).abs() < 4.0 * best.u && best.u < 50.0, "{best:?}");
     let sum: f64 = pair.single_changes.iter().map(|one| one.probability).sum();
-    assert!(best.probability > 0.3 && sum <= 1.0 + 1e-9, "{sum}");
+    assert!(probability > 0.3 && sum <= 1.0 + 1e-9, "{sum}");
     // Nothing changed: nothing is explained.
     let same = compare_inputs(names, vec![input(3, 0.0), input(4, 0.0)], &options, 1).unwrap();
     assert!(same.pairs[0].significant == 0 && same.pairs[0].single_changes.is_empty());

@@ -60,7 +60,7 @@ fn without_an_effect_no_addition_lowers_the_held_out_error() {
         assert!(rejected.heldout_decrease_um <= rejected.u_heldout_decrease_um, "{rejected:?}");
     }
     assert_eq!(result.verdict, TraceVerdict::Clean);
-    let (before, after) = (result.before.heldout_rms_um, result.after.heldout_rms_um);
+    let (before, after) = (result.before.fit.heldout_rms_um, result.after.fit.heldout_rms_um);
     assert!((after / before - 1.0).abs() < 1e-9, "{before} {after}");
 }
 
@@ -76,7 +76,7 @@ fn an_axial_motion_is_found_or_is_among_the_aliases() {
     assert!(named_or_alias(&result, &|effect| is(effect, "EZC", "harmonic", Some(3.0))));
     // At one ball radius it is confounded with a tilt of one order less (docs/reference/effects.md).
     assert!(named_or_alias(&result, &|effect| is(effect, "EAC", "harmonic", Some(2.0))));
-    assert!(result.after.heldout_rms_um < 0.32 && result.before.heldout_rms_um > 0.6);
+    assert!(result.after.fit.heldout_rms_um < 0.32 && result.before.fit.heldout_rms_um > 0.6);
 }
 
 #[test]
@@ -217,8 +217,8 @@ fn ur10_has_a_curve_of_each_joint_and_compliances() {
     // Series B was not used for fitting, choosing or tuning.
     let model = IdentifiedModel::of_fit(&outcome.after, &outcome.after_fit, Provenance::default()).unwrap();
     let second = validate(&model, &ur10_series_b(name)).unwrap().result.model;
-    let length_mm = second.rms.rms_3d_um.unwrap() * 1e-3;
-    let inside = second.in_range.as_ref().map_or(second.coverage_95, |inside| inside.coverage_95);
+    let length_mm = second.residual.rms.rms_3d_um.unwrap() * 1e-3;
+    let inside = second.in_range.as_ref().map_or(second.residual.coverage_95, |inside| inside.coverage_95);
     println!("UR10, Series B: {length_mm:.4} mm, {:.1} % inside the 95 % intervals in range", 100.0 * inside);
     assert!(length_mm <= 0.30 && (0.90..=0.98).contains(&inside), "{length_mm} {inside}");
 }

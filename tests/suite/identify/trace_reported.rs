@@ -71,7 +71,7 @@ fn the_reported_model_has_the_reported_effects() {
     assert!(!trace.result.effects[0].curve.is_empty());
     // The noise is 0.3 µm, and the curve describes the local feature.
     let result = &trace.result;
-    assert!(result.before.rms_um > 0.4 && result.after.rms_um < 0.32, "{}", result.after.rms_um);
+    assert!(result.before.fit.rms_um > 0.4 && result.after.fit.rms_um < 0.32, "{}", result.after.fit.rms_um);
     assert_eq!(result.verdict, TraceVerdict::Explained);
 }
 

@@ -181,7 +181,7 @@ fn ur10_base_parameters_and_series_b() {
     let model = IdentifiedModel::of_fit(&problem, &fit, Provenance::default()).unwrap();
     let second = ur10_series_b(name);
     let result = validate(&model, &second).unwrap().result;
-    let length_mm = result.model.rms.rms_3d_um.unwrap() * 1e-3;
+    let length_mm = result.model.residual.rms.rms_3d_um.unwrap() * 1e-3;
     println!("UR10, location errors of Series A on Series B: {length_mm:.4} mm, {}", result.verdict);
     assert!((length_mm - 0.499).abs() < 0.008, "{length_mm}");
     assert!(result.readings_in_range < result.readings && !result.outside.is_empty());

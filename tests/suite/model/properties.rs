@@ -189,8 +189,8 @@ proptest! {
         }
         let (one, other) = (fitted(&session), fitted(&other));
         same(&one, &other, 1e-4, |_, value| value)?;
-        close(one.model.rms_um, other.model.rms_um)?;
-        close(one.model.heldout_rms_um, other.model.heldout_rms_um)?;
+        close(one.model.fit.rms_um, other.model.fit.rms_um)?;
+        close(one.model.fit.heldout_rms_um, other.model.fit.heldout_rms_um)?;
     }
 
     #[test]
@@ -200,8 +200,8 @@ proptest! {
         other.unknowns.reverse();
         let (one, other) = (fitted(&session), fitted(&other));
         same(&one, &other, 1e-4, |_, value| value)?;
-        close(one.model.rms_um, other.model.rms_um)?;
-        close(one.model.heldout_rms_um, other.model.heldout_rms_um)?;
+        close(one.model.fit.rms_um, other.model.fit.rms_um)?;
+        close(one.model.fit.heldout_rms_um, other.model.fit.heldout_rms_um)?;
     }
 
     #[test]
@@ -227,7 +227,7 @@ proptest! {
         let (one, other) = (fitted(&session), fitted(&other));
         let sign = |id: &str| ErrorName::parse(id).map_or(1.0, |name| mirror_sign(name.freedom.index(), coordinate));
         same(&one, &other, 1e-4, |id, value| sign(id) * value)?;
-        close(one.model.heldout_rms_um, other.model.heldout_rms_um)?;
+        close(one.model.fit.heldout_rms_um, other.model.fit.heldout_rms_um)?;
     }
 
     /// An effect with zero coefficients, or on a test that does not exist, changes no reading.

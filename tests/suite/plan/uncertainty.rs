@@ -91,8 +91,8 @@ fn squares(code: &str, first_seed: usize, complete_fit: bool) -> Vec<(String, f6
             linear_step(&problem, &linear.rank.identifiable_basis)
         };
         let truth = |id: &str| {
-            let named = drawn.truth.iter().find(|(name, _, _)| name == id);
-            named.map_or(0.0, |(_, value, unit)| if unit == "arcsec" { value / ARCSEC } else { value * 1e-3 })
+            let named = drawn.truth.iter().find(|known| known.id == id);
+            named.map_or(0.0, |own| if own.unit == "arcsec" { own.value / ARCSEC } else { own.value * 1e-3 })
         };
         identifiable.iter().map(|&j| ((found[j] - truth(&ids[j])).powi(2)) / linear.covariance[(j, j)]).collect()
     };

@@ -195,7 +195,7 @@ fn a_trace_reports_the_steps_of_its_search_and_the_competing_explanations() {
     }
     assert_eq!(trace.steps[0].id, "EZC~C:h2");
     let (last, after) = (trace.steps.last().unwrap(), &trace.result.after);
-    assert!((last.heldout_rms_um / after.heldout_rms_um - 1.0).abs() < 0.02);
+    assert!((last.heldout_um / after.fit.heldout_rms_um - 1.0).abs() < 0.02);
 }
 
 /// The bundled session with markup in its names.

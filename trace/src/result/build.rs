@@ -75,8 +75,8 @@ pub(super) fn build(
     warnings.extend(statements.warnings);
     warnings.extend(plausibility::coefficients::warnings(before.problem, before.fit));
     let mut result = TraceResult {
-        reading_unit: after.figures.reading_unit,
-        noise_um: after.figures.noise_um,
+        reading_unit: after.figures.noise.unit,
+        noise_um: after.figures.noise.value,
         verdict: verdict.gated(after.figures.outcome.goodness.verdict),
         interrupted: false,
         time_limit_s: None,

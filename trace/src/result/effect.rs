@@ -5,7 +5,7 @@ use abbe_identify::fit::Fit;
 use abbe_identify::parameters::{Parameter, Role};
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{
-    AliasResult, EffectName, EffectResult, LargestOrder, ParameterResult, PriorResult, ShapeParameter,
+    AliasResult, EffectName, EffectResult, Estimate, LargestOrder, PriorResult, ShapeParameter,
 };
 use abbe_model::chain::Machine;
 use abbe_model::effect::description::{explanations, meaning};
@@ -46,7 +46,7 @@ pub(super) struct Found<'f> {
     /// Its fit.
     pub after_fit: &'f Fit,
     /// All parameters after the search; their `u` cover the changes by aliases.
-    pub parameters: &'f [ParameterResult],
+    pub parameters: &'f [Estimate],
     /// Decrease of the residual by the effect, µm.
     pub rms_gain_um: f64,
     /// The effects with which it is confounded.
@@ -130,7 +130,7 @@ pub(super) fn described(
     problem: &Problem,
     fit: &Fit,
     number: usize,
-    parameters: &[ParameterResult],
+    parameters: &[Estimate],
 ) -> Result<EffectResult, IdentifyError> {
     let (machine, effect) = (&problem.session.machine, &problem.parameters.effects[number]);
     let (curve_at_unit, curve_unit) = curve_units(problem, effect);
@@ -138,7 +138,7 @@ pub(super) fn described(
     let own = fit.positions.iter().filter(|position| position.effect == number);
     let intervals: Vec<Option<[f64; 2]>> = own.map(|position| position.interval_95).collect();
     Ok(EffectResult {
-        reading_unit: problem.unit(),
+        unit: problem.unit(),
         name: effect_name(machine, effect),
         family: String::new(),
         shape_parameters: shape_parameters_of(problem, effect, &intervals),
@@ -201,13 +201,12 @@ fn largest_order(problem: &Problem, fit: &Fit, number: usize) -> Option<LargestO
 }
 
 /// The parameters of the `number`-th effect.
-fn parameters_of(problem: &Problem, parameters: &[ParameterResult], number: usize) -> Vec<ParameterResult> {
+fn parameters_of(problem: &Problem, parameters: &[Estimate], number: usize) -> Vec<Estimate> {
     let Some(id) = problem.parameters.effect_ids.get(number) else {
         return Vec::new();
     };
-    let is_own = |p: &&ParameterResult| {
-        p.id.strip_prefix(id.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
-    };
+    let is_own =
+        |p: &&Estimate| p.id.strip_prefix(id.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
     parameters.iter().filter(is_own).cloned().collect()
 }
 

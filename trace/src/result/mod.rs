@@ -12,7 +12,7 @@ use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::{self, Fit, JudgedBy, prepare_with};
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
-use abbe_identify::results::{ChangedParameter, EffectResult, ParameterResult, TraceResult};
+use abbe_identify::results::{EffectResult, Estimate, ParameterChange, TraceResult};
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::words::listed;
@@ -79,7 +79,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Ide
     let of_fit = with_noise_of_fit(before, before_fit)?;
     let (declared, declared_fit) = of_fit.as_ref().map_or((*before, *before_fit), |(problem, fit)| (problem, fit));
     let declared = Model::of(declared, declared_fit, false, by_last)?;
-    let held_out = HeldOut::of(search, declared.figures.heldout_rms_um);
+    let held_out = HeldOut::of(search, declared.figures.fit.heldout_rms_um);
     let mut alias_effects: Vec<Vec<Effect>> = Vec::new();
     let mut competing_effects = Vec::new();
     let mut gains = Vec::new();
@@ -387,14 +387,14 @@ fn explained(problem: &Problem, fit: &Fit, number: usize) -> f64 {
 }
 
 /// Parameters that changed by more than their standard uncertainty.
-fn changed_parameters(before: &[ParameterResult], after: &[ParameterResult]) -> Vec<ChangedParameter> {
+fn changed_parameters(before: &[Estimate], after: &[Estimate]) -> Vec<ParameterChange> {
     before
         .iter()
         .filter_map(|b| {
             let a = after.iter().find(|a| a.id == b.id)?;
-            ((a.value - b.value).abs() > a.u).then(|| ChangedParameter {
+            ((a.value - b.value).abs() > a.u).then(|| ParameterChange {
                 id: a.id.clone(),
-                change: a.value - b.value,
+                value: a.value - b.value,
                 u: a.u,
                 unit: a.unit.clone(),
             })
@@ -416,12 +416,12 @@ mod tests {
 
     #[test]
     fn parameters_that_change_by_more_than_their_uncertainty_are_listed() {
-        let parameter = |id: &str, value: f64, u: f64| ParameterResult::new(id, value, u, "um");
+        let parameter = |id: &str, value: f64, u: f64| Estimate::new(id, value, u, "um");
         let before = [parameter("EX0C", 3.0, 0.1), parameter("EY0C", 3.0, 0.1), parameter("EZ0A", 1.0, 0.1)];
         let after = [parameter("EX0C", 1.0, 1.5), parameter("EY0C", 1.0, 2.5)];
         let changed = changed_parameters(&before, &after);
         assert_eq!(changed.len(), 1);
-        assert_eq!((changed[0].id.as_str(), changed[0].change, changed[0].u), ("EX0C", -2.0, 1.5));
+        assert_eq!((changed[0].id.as_str(), changed[0].value, changed[0].u), ("EX0C", -2.0, 1.5));
     }
 
     /// A line and a wave explain a parabola together. Where the parabola takes the place of the line, as a more probable alias

@@ -54,7 +54,7 @@ pub(crate) fn outcome_of_poses(
         .map(|(k, accepted)| SearchStep {
             id: accepted.effect.id(),
             effects: k + 1,
-            heldout_rms_um: accepted.heldout_rms_mm * 1e3,
+            heldout_um: accepted.heldout_rms_mm * 1e3,
         })
         .collect();
     let statements = Statements {

@@ -9,7 +9,7 @@ use abbe_identify::noise::{Noise, NoiseSource, ShownNoise};
 use abbe_identify::numerics::triangle::Triangle;
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
-use abbe_identify::results::ParameterResult;
+use abbe_identify::results::Estimate;
 use abbe_identify::results::validation::RmsResult;
 use abbe_identify::unit::ReadingUnit;
 use abbe_model::component::ErrorName;
@@ -225,7 +225,7 @@ impl<'m> KnownErrors<'m> {
         }
         if self.model.noise.source == NoiseSource::Residual {
             // The model's own residual contains what the model lacks, and so does the residual here.
-            let lacking = self.model.quality.heldout_rms_um * 1e-3;
+            let lacking = self.model.fit.heldout_rms_um * 1e-3;
             if problem.noise.sigma_mm < lacking {
                 problem.noise = Noise::white(lacking, NoiseSource::Residual);
                 self.noise_source = NoiseSource::Model;
@@ -320,7 +320,7 @@ impl<'m> KnownErrors<'m> {
     ///
     /// # Errors
     /// If the model cannot be evaluated.
-    pub fn set_up_estimates(&self, values: &[f64]) -> Result<Vec<ParameterResult>, IdentifyError> {
+    pub fn set_up_estimates(&self, values: &[f64]) -> Result<Vec<Estimate>, IdentifyError> {
         let problem = self.problem(values);
         let Minimum { beta, triangles, rank } = minimum(&problem, None)?;
         let whole = problem.prior_triangle(&beta).merged(&triangles);
@@ -330,7 +330,7 @@ impl<'m> KnownErrors<'m> {
             let display = parameter.unit.display_per_internal;
             let u = covariance[(j, j)].max(0.0).sqrt() * display;
             let meaning = abbe_identify::parameter_description::parameter_meaning(&problem, j, None);
-            ParameterResult::new(&parameter.id, beta[j] * display, u, &parameter.unit.name).with_meaning(meaning)
+            Estimate::new(&parameter.id, beta[j] * display, u, &parameter.unit.name).with_meaning(meaning)
         });
         Ok(estimate.collect())
     }
@@ -364,17 +364,17 @@ fn first_noise(model: &IdentifiedModel, session: &Session) -> Result<(Noise, Noi
         return Ok((Noise::white(sigma, NoiseSource::Stated), NoiseSource::Stated));
     }
     let unit = ReadingUnit::of(session);
-    if model.reading_unit != unit {
+    if model.unit != unit {
         return Err(IdentifyError::Missing {
             of: "the session".to_string(),
-            what: format!("noise, and that of the model is in {}", model.reading_unit.symbol()),
+            what: format!("noise, and that of the model is in {}", model.unit.symbol()),
             remedy: format!("state `{}` in [instrument]", unit.noise_key()),
         });
     }
     let noise = match model.noise.source {
         // A residual contains what the model lacks; on readings that it has not seen, that is the held-out error.
         NoiseSource::Residual => {
-            Noise::white((model.quality.heldout_rms_um * 1e-3).max(model.noise.sigma_mm), NoiseSource::Residual)
+            Noise::white((model.fit.heldout_rms_um * 1e-3).max(model.noise.sigma_mm), NoiseSource::Residual)
         }
         // The inflation belongs to the likelihood of the model's families; it is no noise.
         NoiseSource::Stated

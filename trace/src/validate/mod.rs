@@ -21,9 +21,10 @@ mod verdict;
 
 use abbe_identify::error::IdentifyError;
 use abbe_identify::model_file::{IdentifiedModel, range};
+use abbe_identify::noise::ReadingNoise;
 use abbe_identify::parameters::Role;
 use abbe_identify::results::validation::{
-    InRangeResult, ModelNotJudged, MovedParameter, RmsResult, ValidatedModel, ValidationResult, WithoutResult,
+    ModelNotJudged, MovedParameter, RmsResult, ValidatedModel, ValidationResult, WithoutResult,
 };
 use abbe_model::component::ErrorName;
 use abbe_model::session::Session;
@@ -159,26 +160,12 @@ pub fn validate_anew(
         readings_in_range,
         outside: left,
         outliers: rejected.iter().flatten().filter(|rejected| **rejected).count(),
-        reading_unit: known.set_up.unit(),
-        noise_um: known.set_up.noise.sigma_mm * 1e3,
-        noise_source: known.noise_source,
+        noise: ReadingNoise { source: known.noise_source, ..ReadingNoise::of(&known.set_up) },
         nominal: RmsResult::from(&nominal),
         locations: RmsResult::from(&locations),
         model: ValidatedModel {
-            rms: RmsResult::from(&rms),
-            predicted_rms_um: prediction.rms_mm * 1e3,
-            residual_ratio: prediction.ratio(),
-            chi_square: prediction.chi_square,
-            degrees_of_freedom: prediction.freedom,
-            p_value: prediction.p_value,
-            in_range: in_range.as_ref().map(|(rms, judged, _)| InRangeResult {
-                rms: RmsResult::from(rms),
-                predicted_rms_um: judged.prediction.rms_mm * 1e3,
-                residual_ratio: judged.prediction.ratio(),
-                p_value: judged.prediction.p_value,
-                coverage_95: judged.prediction.coverage_95,
-            }),
-            coverage_95: prediction.coverage_95,
+            residual: prediction.judged(&rms),
+            in_range: in_range.as_ref().map(|(rms, judged, _)| judged.prediction.judged(rms)),
         },
         without,
         moved: if not_judged.is_none() { judged.moved.clone() } else { Vec::new() },

@@ -74,18 +74,15 @@ pub(super) fn moved(known: &KnownErrors<'_>, at: &Linearised) -> Result<Vec<Move
         .zip(&alternatives)
         .map(|((i, change), alternatives)| {
             let parameter = &known.model.parameters[known.carried[*i]];
-            let display = parameter.unit.display_per_internal * parameter.size;
             MovedParameter {
-                id: id(*i),
-                value: change.value * display,
-                u: change.u * variance.sqrt() * display,
-                unit: parameter.unit.name.clone(),
+                change: parameter.change(change.value * parameter.size, change.u * variance.sqrt() * parameter.size),
                 p_value: two_sided(change.z() / variance.sqrt(), candidates.len()),
                 alternatives: alternatives.iter().map(|j| id(*j)).collect(),
             }
         })
         .collect();
-    moved.sort_by(|a, b| (b.value / b.u).abs().total_cmp(&(a.value / a.u).abs()));
+    let ratio = |moved: &MovedParameter| (moved.change.value / moved.change.u).abs();
+    moved.sort_by(|a, b| ratio(b).total_cmp(&ratio(a)));
     Ok(moved)
 }
 

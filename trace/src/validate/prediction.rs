@@ -16,9 +16,10 @@ use abbe_identify::numerics::solve::{Svd, solve_square};
 use abbe_identify::numerics::symmetric::Symmetric;
 use abbe_identify::numerics::tails::{normal_quantile, residual_tail};
 use abbe_identify::numerics::tolerances::MIN_IDENTIFIABLE;
+use abbe_identify::results::validation::{JudgedResidual, RmsResult};
 use faer::Mat;
 
-use super::known::{KnownErrors, Linearised};
+use super::known::{KnownErrors, Linearised, Rms};
 
 /// Probability of the intervals.
 const COVERAGE: f64 = 0.95;
@@ -85,6 +86,19 @@ impl Prediction {
     /// `√(χ²/ν)`: the residual over the predicted one.
     pub fn ratio(&self) -> f64 {
         (self.chi_square / self.freedom as f64).sqrt()
+    }
+
+    /// As JSON has it, with the residual itself.
+    pub fn judged(&self, rms: &Rms) -> JudgedResidual {
+        JudgedResidual {
+            rms: RmsResult::from(rms),
+            predicted_rms_um: self.rms_mm * 1e3,
+            residual_ratio: self.ratio(),
+            chi_square: self.chi_square,
+            degrees_of_freedom: self.freedom,
+            p_value: self.p_value,
+            coverage_95: self.coverage_95,
+        }
     }
 
     /// Whether the residual is as large as predicted, and the intervals cover it.

@@ -40,10 +40,10 @@ fn a_change_is_the_difference_of_two_fits() {
     let found = moved::moved(&known_noise, &known_noise.linearised(&values, &beta).unwrap()).unwrap();
     assert_eq!(found.len(), 1);
     let expected_um = (other.parameters[j].value - moved.parameters[i].value) * 1e3;
-    assert!((found[0].value / expected_um - 1.0).abs() < 2e-3, "{found:?} {expected_um}");
+    assert!((found[0].change.value / expected_um - 1.0).abs() < 2e-3, "{found:?} {expected_um}");
     // The excess of the residual over the stated noise enlarges the uncertainty.
     let u_um = moved.u(i).hypot(other.u(j)) * 1e3;
-    assert!(found[0].u / u_um > 0.999 && found[0].u / u_um < 1.5, "{found:?} {u_um}");
+    assert!(found[0].change.u / u_um > 0.999 && found[0].change.u / u_um < 1.5, "{found:?} {u_um}");
 }
 
 /// The readings of the model's own session are predicted; a set-up that is known exactly leaves nothing to estimate.
@@ -103,7 +103,7 @@ fn the_inflation_of_families_is_no_noise() {
     let mut inflated = model.clone();
     inflated.noise.inflation = 40.0;
     let [plain, inflated] = [&model, &inflated].map(|model| validate(model, &second).unwrap().result);
-    assert_eq!(plain.noise_source, NoiseSource::Model);
+    assert_eq!(plain.noise.source, NoiseSource::Model);
     assert_eq!(inflated.model, plain.model);
     assert_eq!(inflated.verdict, plain.verdict);
 }

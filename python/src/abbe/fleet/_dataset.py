@@ -22,7 +22,7 @@ from .. import _abbe
 from .._errors import Error
 from ._work import Path
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 """Version of the tables. It is in the metadata of every file (``abbe.schema_version``)."""
 
 _GROUPS = 4
@@ -278,13 +278,16 @@ def _rows(
     table: str, note: dict[str, Any], record: dict[str, Any], shared: set[str]
 ) -> Iterable[dict[str, Any]]:
     """The rows of a session in a table."""
-    machine = record["machine"] or {}
+    machine, model = record["machine"] or {}, record["model"] or {}
+    outcome = model.get("outcome", {})
     own = {"key": record["key"], "machine_id": record["machine_id"], "date": _date(record["date"])}
     if table == "sessions":
         error, validation = record["error"] or {}, record["validation"] or {}
         yield {
-            **{name: record.get(name) for name in SCHEMAS["sessions"]},
+            **{name: record.get(name, model.get(name)) for name in SCHEMAS["sessions"]},
             **own,
+            "goodness": outcome["goodness"]["verdict"] if model else None,
+            "outliers": len(model["outliers"]) if model else None,
             "session_id": note["session_id"],
             "shared_id": note["session_id"] in shared,
             "file": note["file"],
@@ -297,23 +300,22 @@ def _rows(
             "validation_rms_um": validation.get("rms_um"),
         }
     elif table == "parameters":
-        for position, parameter in enumerate(record["parameters"]):
-            covariance = _covariance(record, position) if parameter["identifiable"] else None
-            yield {**own, **parameter, "position": position, "covariance": covariance}
+        matrix = model.get("covariance", {}).get("matrix", [])
+        found = [
+            {**parameter, "identifiable": True, "covariance": row}
+            for parameter, row in zip(model.get("parameters", []), matrix)
+        ]
+        without = {"identifiable": False, "significant": False, "quotable": False}
+        found += [{**parameter, **without} for parameter in outcome.get("not_estimated", [])]
+        for position, parameter in enumerate(found):
+            yield {**own, **parameter, "position": position}
     else:
         for effect in record["effects"]:
             yield {
                 **own,
+                "tests": [],
                 **effect,
                 "machine_code": machine.get("code"),
                 "is_unique": effect["unique"],
                 "alias_set": sorted({effect["id"], *effect["aliases"]}),
             }
-
-
-def _covariance(record: dict[str, Any], row: int) -> list[float]:
-    """A row of the covariance from its lower triangle."""
-    count = sum(parameter["identifiable"] for parameter in record["parameters"])
-    packed = record["covariance"]
-    places = [(max(row, column), min(row, column)) for column in range(count)]
-    return [packed[high * (high + 1) // 2 + low] for high, low in places]

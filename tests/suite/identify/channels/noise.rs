@@ -44,13 +44,13 @@ fn the_noise_of_lengths_and_angles_is_found_apart() {
         ));
         let (problem, found) = prepare(&session, 1).unwrap();
         let result = fit::report(&problem, &found).unwrap();
-        lengths.push(result.model.noise_um);
+        lengths.push(result.model.noise.value);
         angles.push(result.model.of_angles.unwrap().noise_arcsec);
         chi.push(result.model.chi_square / result.model.degrees_of_freedom as f64);
         // A plan and a validation of this session weigh its angles alike.
         let (complete, noise) = abbe::plan::prepared(&session, &Default::default()).unwrap();
         assert!((complete.lever_mm / problem.session.lever_mm - 1.0).abs() < 1e-12);
-        assert!((noise.sigma_mm * 1e3 / result.model.noise_um - 1.0).abs() < 1e-9);
+        assert!((noise.sigma_mm * 1e3 / result.model.noise.value - 1.0).abs() < 1e-9);
     }
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     // Twenty sessions of about 80 degrees of freedom a unit: 1.8 % of sampling error.

@@ -45,7 +45,7 @@ fn a_precessing_azimuth_axis_is_named() {
     assert!((sag.value - answer["sag_arcsec"].as_f64().unwrap()).abs() < 4.0 * sag.u, "{sag:?}");
     assert_eq!(result.effects.len(), 2);
     let noise = answer["noise_arcsec"].as_f64().unwrap();
-    assert!((result.after.heldout_rms_um / noise - 1.0).abs() < 0.15, "{}", result.after.heldout_rms_um);
+    assert!((result.after.fit.heldout_rms_um / noise - 1.0).abs() < 0.15, "{}", result.after.fit.heldout_rms_um);
 }
 
 /// A joint of a robot that moves on a circle, three times per turn.

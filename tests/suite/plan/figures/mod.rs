@@ -219,7 +219,7 @@ fn figures_of_errors_follow_from_differences_of_readings() {
     let names = ["A", "C", "C far"];
     assert_eq!(found.readings, columns.tests.len());
     assert_eq!((found.parameter_count, found.rank, found.setup_count), (columns.own.len(), columns.own.len(), 2));
-    near(found.noise_um, NOISE_UM, 1e-12, "noise");
+    near(found.noise.value, NOISE_UM, 1e-12, "noise");
     let (covariance, identifiable) = columns.covariance(NOISE_UM, |_| true);
     assert!(identifiable.iter().all(|is| *is));
     assert_eq!(found.errors.iter().map(|error| error.id.as_str()).collect::<Vec<_>>(), found.correlation.ids);
