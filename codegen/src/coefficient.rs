@@ -7,7 +7,8 @@ use abbe_model::chain::Machine;
 use abbe_model::driver::Driver;
 use abbe_model::effect::shape::Per;
 use abbe_model::effect::{Component, Effect};
-use abbe_model::instrument::{InstrumentParameter, InternalUnit};
+use abbe_model::instrument::InstrumentParameter;
+use abbe_model::unit::InternalUnit;
 
 use crate::error::CodegenError;
 

@@ -3,7 +3,8 @@
 use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::driver::DriverQuantity;
-use abbe_model::instrument::{InstrumentParameter, InternalUnit};
+use abbe_model::instrument::InstrumentParameter;
+use abbe_model::unit::InternalUnit;
 
 use crate::coefficient::Coefficient;
 

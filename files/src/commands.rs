@@ -12,9 +12,9 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::error::{Location, ModelError};
 use abbe_model::session::readings::{AxisTravel, Readings};
+use abbe_model::unit::Unit;
 use csv::StringRecord;
 
-use super::quantity::Unit;
 use super::stamp::FileStamp;
 use super::store::{OpenFile, Store};
 use super::table::columns::Role;
@@ -253,7 +253,7 @@ impl CommandFile {
     /// A position in the unit of a column, mm and rad inside.
     pub fn in_unit_of(&self, column: usize, position: f64) -> f64 {
         match self.meanings.get(column) {
-            Some(Meaning::Of(Role::Axis(_, unit))) => unit.in_unit(position),
+            Some(Meaning::Of(Role::Axis(_, unit))) => unit.to_display(position),
             _ => position,
         }
     }
@@ -397,8 +397,8 @@ fn meaning(machine: &Machine, name: &str, first: bool) -> Meaning {
         return Meaning::Of(role);
     }
     let (stem, unit) = match name.rsplit_once('_') {
-        Some((stem, unit)) if POSE[..3].contains(&stem) => (stem, Unit::of_length(unit)),
-        _ => (name, Some(Unit::Times(1.0)).filter(|_| POSE[3..].contains(&name))),
+        Some((stem, unit)) if POSE[..3].contains(&stem) => (stem, Unit::of_column(unit, false)),
+        _ => (name, Some(Unit::One).filter(|_| POSE[3..].contains(&name))),
     };
     match (POSE.iter().position(|part| *part == stem), unit) {
         (Some(part), Some(unit)) => Meaning::Pose(part, unit),

@@ -35,12 +35,12 @@
 )]
 
 pub(crate) mod access;
+pub(crate) mod axes;
 mod check;
 pub mod commands;
 pub mod import;
 mod lower;
 mod node;
-pub(crate) mod quantity;
 pub mod read;
 pub mod robot;
 pub mod source;

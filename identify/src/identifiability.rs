@@ -285,14 +285,13 @@ mod tests {
     use abbe_model::session::Prior;
 
     use super::*;
-    use crate::unit::Unit;
 
     /// Up to six quantities are named; of more, five, with the number of the others. A quantity that several groups share
     /// with one value is one.
     #[test]
     fn a_long_combination_names_five_quantities() {
         let parameter = |id: &str, role: Role| {
-            let unit = Unit { name: "um".into(), display_per_internal: 1e3 };
+            let unit = abbe_model::unit::Unit::Micrometre.into();
             Parameter { id: id.into(), unit, size: 1.0, prior: Prior::Free, role, found: 0.0 }
         };
         let ids = ["EX0C", "EY0C", "EX0A", "EY0A", "EZ0A", "EX0B", "EY0B"];

@@ -8,13 +8,14 @@ use std::sync::Arc;
 
 use abbe_model::driver::Reference;
 use abbe_model::effect::{CoefficientPrior, Component, Effect};
-use abbe_model::instrument::{InstrumentKind, InternalUnit};
+use abbe_model::instrument::InstrumentKind;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::{Prior, Session, Test};
+use abbe_model::unit::InternalUnit;
 
 use crate::error::IdentifyError;
 use crate::start::{point_mm, points};
-use crate::unit::Unit;
+use crate::unit::ParameterUnit;
 use basis::BasisOverTest;
 pub(crate) use preference::{natural, pivot_preference};
 
@@ -48,7 +49,7 @@ pub struct Parameter {
     /// Identifier in results: `EY0A`, `bar[A100]`, `EZC~C:h2.cos`.
     pub id: String,
     /// Display unit.
-    pub unit: Unit,
+    pub unit: ParameterUnit,
     /// Physical size, internal units: 1 mm, 0.01 rad, or the value that changes the component by that much.
     pub size: f64,
     /// The prior.
@@ -157,10 +158,10 @@ impl Parameters {
             let Some(slot) = session.machine.error_slot(name) else {
                 return Err(IdentifyError::no_axis(&session.machine, &format!("`{id}`: "), &name.axis));
             };
-            let unit = if name.freedom.is_angle() { InternalUnit::Radian } else { InternalUnit::Millimetre };
+            let unit = name.freedom.unit();
             let index = parameters.push(Parameter {
                 id,
-                unit: Unit::of(unit),
+                unit: unit.displayed().into(),
                 size: physical_size(unit),
                 prior: Prior::Free,
                 role: Role::Error,
@@ -191,7 +192,7 @@ impl Parameters {
                     }
                     None => parameters.push(Parameter {
                         id,
-                        unit: Unit::of(unknown.unit),
+                        unit: unknown.unit.displayed().into(),
                         size: physical_size(unknown.unit),
                         prior,
                         role: Role::Setup,
@@ -264,7 +265,7 @@ impl Parameters {
         for (k, name) in effect.shape.coefficient_names().into_iter().enumerate() {
             self.push(Parameter {
                 id: format!("{id}{}{name}", dot(&name)),
-                unit: Unit::of_effect(session, effect, k),
+                unit: ParameterUnit::of_effect(session, effect, k),
                 size: if largest[k] > 0.0 { size / largest[k] } else { size },
                 prior,
                 role: Role::Coefficient { effect: number, coefficient: k },
@@ -275,7 +276,7 @@ impl Parameters {
             let width = effect.width_of_number(*which);
             self.push(Parameter {
                 id: format!("{id}.{}", effect.shape.number_names()[*which]),
-                unit: Unit::of_number(session, effect),
+                unit: ParameterUnit::of_number(session, effect),
                 size: width,
                 prior: Prior::Gaussian(width),
                 role: Role::Number { effect: number, number: *which },

@@ -20,6 +20,7 @@ use abbe_model::instrument::{Contact, Station};
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
+use abbe_model::unit::Unit;
 use faer::Mat;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -30,7 +31,6 @@ use crate::noise::Noise;
 use crate::numerics::parallel;
 use crate::numerics::triangle::BLOCK_ROWS;
 use crate::parameters::{Parameters, Role, TestParameters};
-use crate::unit::ReadingUnit;
 use abbe_model::driver::Reference;
 
 /// A session with readings, its parameters, and the weights of its readings.
@@ -308,8 +308,8 @@ impl Problem {
 
     /// The unit of readings and residuals in results: µm, or ″ if every channel is an angle. At the lever of such
     /// a session ([`Session::lever_mm`]) one arcsecond is one micrometre.
-    pub fn unit(&self) -> ReadingUnit {
-        ReadingUnit::of(&self.session)
+    pub fn unit(&self) -> Unit {
+        self.session.reading_unit()
     }
 
     /// Whether the readings of all tests are vectors, three coordinates each.

@@ -7,12 +7,13 @@ use abbe_model::document::fault::Fault;
 use abbe_model::document::node::{Named, Node};
 use abbe_model::document::value::Long;
 use abbe_model::session::limits::{LARGEST, MAX_LENGTH_MM};
+use abbe_model::unit::Unit;
 use abbe_model::words::number as number_in_words;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::error::IdentifyError;
-use crate::unit::{ARCSEC, Unit};
+use crate::unit::ParameterUnit;
 
 /// The value of one parameter, with its unit.
 ///
@@ -36,19 +37,6 @@ pub struct Given {
 
 /// Maximum length of a number with its unit, in bytes. It bounds the time to separate number and unit.
 const MAX_BYTES: usize = 100;
-
-/// Units of one quantity, each with its size in the first unit.
-const LENGTHS: [(&str, f64); 5] = [("um", 1.0), ("µm", 1.0), ("μm", 1.0), ("nm", 1e-3), ("mm", 1e3)];
-const ANGLES: [(&str, f64); 6] = [
-    ("arcsec", 1.0),
-    ("arcmin", 60.0),
-    ("deg", 3600.0),
-    ("urad", ARCSEC * 1e-6),
-    ("mrad", ARCSEC * 1e-3),
-    ("rad", ARCSEC),
-];
-const TIMES: [(&str, f64); 3] = [("ms", 1.0), ("us", 1e-3), ("s", 1e3)];
-const RATIOS: [(&str, f64); 4] = [("um/m", 1.0), ("ppm", 1.0), ("percent", 1e4), ("%", 1e4)];
 
 impl Given {
     /// Reads `ID=VALUEUNIT`, spaces allowed.
@@ -100,7 +88,7 @@ impl Given {
     ///
     /// # Errors
     /// If the two units are of different quantities.
-    pub fn inside(&self, unit: &Unit) -> Result<f64, IdentifyError> {
+    pub fn inside(&self, unit: &ParameterUnit) -> Result<f64, IdentifyError> {
         self.in_unit(&unit.name).map(|value| value / unit.display_per_internal)
     }
 
@@ -112,35 +100,25 @@ impl Given {
         if self.value == 0.0 || self.unit == wanted {
             return Ok(self.value);
         }
-        let factor = factor(&self.unit, wanted).or_else(|| {
+        let convert = |unit: &str, to: &str| Unit::parse(unit)?.convert(self.value, Unit::parse(to)?);
+        let converted = convert(&self.unit, wanted).or_else(|| {
             // `mm/h` to `um/h`.
             let (above, below) = self.unit.split_once('/')?;
             let (wanted_above, wanted_below) = wanted.split_once('/')?;
-            (below == wanted_below).then(|| factor(above, wanted_above))?
+            (below == wanted_below).then(|| convert(above, wanted_above))?
         });
-        match factor {
-            Some(factor) => Ok(self.value * factor),
-            None => Err(IdentifyError::OtherUnit {
-                name: self.id.clone(),
-                unit: self.unit.clone(),
-                expected: wanted.to_string(),
-            }),
-        }
+        converted.ok_or_else(|| IdentifyError::OtherUnit {
+            name: self.id.clone(),
+            unit: self.unit.clone(),
+            expected: wanted.to_string(),
+        })
     }
 }
 
 /// Whether a value is a length beyond [`MAX_LENGTH_MM`].
 fn longer_than_a_kilometre(value: f64, unit: &str) -> bool {
-    let um = LENGTHS.iter().find(|(name, _)| *name == unit).map(|(_, um)| um * value.abs());
-    um.is_some_and(|um| um > 1e3 * MAX_LENGTH_MM)
-}
-
-/// The size of the first unit in the second one.
-fn factor(from: &str, to: &str) -> Option<f64> {
-    [&LENGTHS[..], &ANGLES[..], &TIMES[..], &RATIOS[..]].into_iter().find_map(|units| {
-        let of = |name: &str| units.iter().find(|(unit, _)| *unit == name).map(|(_, size)| *size);
-        Some(of(from)? / of(to)?)
-    })
+    let unit = Unit::parse(unit).filter(|unit| unit.is_length());
+    unit.is_some_and(|unit| unit.to_internal(value.abs()) > MAX_LENGTH_MM)
 }
 
 /// Reads a file of values, one `EY0A = "35.3 um"` per line, in the order of the file.

@@ -12,6 +12,7 @@ use abbe_model::component::ErrorName;
 use abbe_model::sensitivity::TestModel;
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Prior, Session, planned};
+use abbe_model::unit::ARCSEC_PER_RAD;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use schemars::JsonSchema;
@@ -20,7 +21,6 @@ use serde::Serialize;
 use crate::error::IdentifyError;
 use crate::parameters::{Parameters, Role};
 use crate::quantity::Given;
-use crate::unit::ARCSEC;
 
 /// The values and options of a simulation.
 #[derive(Clone, Debug, Default)]
@@ -79,7 +79,7 @@ impl SimulationResult {
             written_session: file.display().to_string(),
             readings: simulated.readings.iter().map(|readings| readings.rows()).sum(),
             noise_um: simulated.noise_mm * 1e3,
-            noise_arcsec: session.units().angles.then_some(simulated.noise_rad * ARCSEC),
+            noise_arcsec: session.units().angles.then_some(simulated.noise_rad * ARCSEC_PER_RAD),
             resolution_um: session.resolution_mm.map(|step| step * 1e3),
             truth: simulated.truth.clone(),
             warnings: simulated.warnings.clone(),

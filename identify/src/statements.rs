@@ -16,6 +16,7 @@ use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
 use abbe_model::instrument::Contact;
+use abbe_model::unit::Unit;
 
 use crate::fit::doubt_on_unit;
 use crate::linear::is_of_interest;
@@ -30,12 +31,10 @@ use crate::results::{
 };
 use crate::tolerance::Conformity;
 use crate::tolerance::rule::Decision;
-use crate::unit::ARCSEC;
 
 /// A component of a unit vector above which it is taken as along the axis.
 const ALONG: f64 = 0.9;
 /// Millimetres in a metre, micrometres in a millimetre.
-const THOUSAND: f64 = 1e3;
 
 impl Statements {
     /// Of a fit.
@@ -325,7 +324,7 @@ fn correction(
         .filter_map(|(name, by)| {
             let id = name.to_string();
             let place = parameters.iter().position(|parameter| parameter.id == id)?;
-            let internal = if name.freedom.is_angle() { by / ARCSEC } else { by / THOUSAND };
+            let internal = by / name.freedom.unit().displayed().per_internal();
             Some((place, internal))
         })
         .collect();
@@ -339,11 +338,10 @@ fn correction(
     }
     let is_angle = terms.first().is_some_and(|(name, _)| name.freedom.is_angle());
     // Changes and nominal values per mm, per rad or per 1.
-    let (shown, identified, unit) = match quantity {
-        LineQuantity::Point => (THOUSAND, 1.0, "um"),
-        LineQuantity::Direction => (THOUSAND * THOUSAND, 1.0, "um/m"),
-        LineQuantity::Zero if is_angle => (ARCSEC, 1f64.to_degrees(), "arcsec"),
-        LineQuantity::Zero => (THOUSAND, 1.0, "um"),
+    let (unit, identified) = match quantity {
+        LineQuantity::Direction => (Unit::MicrometrePerMetre, 1.0),
+        LineQuantity::Zero if is_angle => (Unit::Arcsecond, Unit::Degree.per_internal()),
+        LineQuantity::Point | LineQuantity::Zero => (Unit::Micrometre, 1.0),
     };
     let change: f64 = own.iter().map(|(place, by)| by * parameters[*place].value).sum();
     let of = |a: usize, b: usize| covariance.matrix.get(a).and_then(|row| row.get(b)).copied().unwrap_or(0.0);
@@ -355,8 +353,8 @@ fn correction(
         coordinate,
         nominal,
         identified: nominal + change * identified,
-        change: change * shown,
-        u: variance.max(0.0).sqrt() * shown,
+        change: unit.to_display(change),
+        u: unit.to_display(variance.max(0.0).sqrt()),
         unit: unit.to_string(),
         determined_by: if by_prior { DeterminedBy::Prior } else { DeterminedBy::Readings },
         quotable: own.iter().all(|(place, _)| parameters[*place].quotable),

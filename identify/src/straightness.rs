@@ -8,7 +8,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::positioning::{self, Position};
-use crate::unit::Unit;
 
 /// Straightness of an axis in one direction across it (ISO 230-1).
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -57,7 +56,7 @@ fn of_test(session: &Session, test: &Test, left_out: &[bool]) -> Vec<Straightnes
     let across = channels.filter(|(place, _)| test.station.is_straightness(*place));
     across
         .filter_map(|(place, channel)| {
-            let per_unit = Unit::of(channel.unit).display_per_internal;
+            let per_unit = channel.unit.displayed().per_internal();
             let observed = |row: usize, values: &[f64]| (row, values[place] * per_unit).1;
             let shown = |at| kind.to_display(at);
             let positions = positioning::approaches(readings, left_out, place, &places, shown, observed);

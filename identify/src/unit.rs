@@ -1,103 +1,49 @@
-//! Display units: µm, arcsec, and the units of effects' coefficients.
+//! The units of parameters in results.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::driver::Driver;
 use abbe_model::effect::shape::Per;
 use abbe_model::effect::{Effect, Shape};
-use abbe_model::instrument::InternalUnit;
 use abbe_model::session::Session;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use abbe_model::unit::{InternalUnit, Unit};
 
-/// A unit of reported results.
+/// The unit of a parameter in results: a unit, or a quotient of units.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Unit {
+pub struct ParameterUnit {
     /// The name in results: `um`, `arcsec`, `um/h`.
     pub name: String,
     /// Number of display units per internal unit (mm, rad, …).
     pub display_per_internal: f64,
 }
 
-/// The unit of the figures of readings: noise, residuals, held-out errors. Keys of results end in it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub enum ReadingUnit {
-    /// µm: of lengths, or of lengths beside angles.
-    #[default]
-    #[serde(rename = "um")]
-    Micrometre,
-    /// ″: of a session whose channels are all angles.
-    #[serde(rename = "arcsec")]
-    Arcsecond,
-}
-
-impl ReadingUnit {
-    /// Its name in keys of results.
-    pub fn name(self) -> &'static str {
-        match self {
-            ReadingUnit::Micrometre => "um",
-            ReadingUnit::Arcsecond => "arcsec",
-        }
-    }
-
-    /// Of the readings of a session.
-    pub fn of(session: &Session) -> ReadingUnit {
-        if session.units().only_angles() { ReadingUnit::Arcsecond } else { ReadingUnit::Micrometre }
-    }
-
-    /// A figure of readings with its symbol.
-    pub fn text(self, value: f64, places: usize) -> String {
-        format!("{value:.places$} {}", self.symbol())
-    }
-
-    /// Its symbol.
-    pub fn symbol(self) -> &'static str {
-        if self.is_micrometre() { "µm" } else { "″" }
-    }
-
-    /// The key of a session that states the noise of readings in this unit.
-    pub fn noise_key(self) -> &'static str {
-        if self.is_micrometre() { "noise_um" } else { "noise_arcsec" }
-    }
-
-    /// Whether it is µm, which results do not state.
-    pub fn is_micrometre(&self) -> bool {
-        *self == ReadingUnit::Micrometre
+impl From<Unit> for ParameterUnit {
+    fn from(unit: Unit) -> ParameterUnit {
+        ParameterUnit { name: unit.name().to_string(), display_per_internal: unit.per_internal() }
     }
 }
 
-/// Millimetres in a metre.
-const MM_PER_M: f64 = 1e3;
+impl ParameterUnit {
+    /// The symbol; the name of a quotient.
+    pub fn symbol(&self) -> &str {
+        Unit::parse(&self.name).map_or(&*self.name, |unit| unit.symbol())
+    }
 
-/// Arcseconds per radian.
-pub const ARCSEC: f64 = 180.0 * 3600.0 / std::f64::consts::PI;
-
-impl Unit {
     /// The unit of the numbers of the shape of an effect: that of its driver, or a time constant.
-    pub fn of_number(session: &Session, effect: &Effect) -> Unit {
+    pub fn of_number(session: &Session, effect: &Effect) -> ParameterUnit {
         if effect.shape.lag_s().is_some() {
-            return Unit { name: "s".to_string(), display_per_internal: 1.0 };
+            return Unit::Second.into();
         }
         let unit = effect.driver_unit(&session.machine);
-        Unit { name: unit.result.to_string(), display_per_internal: unit.to_display(1.0) }
-    }
-
-    /// The unit of a component.
-    pub fn of(internal_unit: InternalUnit) -> Unit {
-        let (name, display_per_internal) = match internal_unit {
-            InternalUnit::Millimetre => ("um", 1e3),
-            InternalUnit::Radian => ("arcsec", ARCSEC),
-            InternalUnit::Ratio => ("um/m", 1e6),
-        };
-        Unit { name: name.to_string(), display_per_internal }
+        ParameterUnit { name: unit.result().to_string(), display_per_internal: unit.to_display(1.0) }
     }
 
     /// The unit in which coefficient `k` of an effect in a session is reported.
-    pub fn of_effect(session: &Session, effect: &Effect, k: usize) -> Unit {
+    pub fn of_effect(session: &Session, effect: &Effect, k: usize) -> ParameterUnit {
         let Some(internal_unit) = effect.component.unit(&session.instrument_parameters()) else {
-            return Unit { name: "ms".to_string(), display_per_internal: 1e3 };
+            return Unit::Millisecond.into();
         };
         let driver_axis = effect.driver.axis_kind(&session.machine);
-        Unit::of_coefficient(internal_unit, &effect.driver, driver_axis, &effect.shape, k)
+        ParameterUnit::of_coefficient(internal_unit, &effect.driver, driver_axis, &effect.shape, k)
     }
 
     /// The unit of coefficient `k` of an effect. `driver_axis` is the kind of the axis that the effect follows, if it
@@ -116,9 +62,9 @@ impl Unit {
         driver_axis: Option<AxisKind>,
         shape: &Shape,
         k: usize,
-    ) -> Unit {
-        let plain = Unit::of(component);
-        let per = |what: &str| Unit {
+    ) -> ParameterUnit {
+        let plain = ParameterUnit::from(component.displayed());
+        let per = |what: &str| ParameterUnit {
             name: format!("{}/{what}", plain.name),
             display_per_internal: plain.display_per_internal,
         };
@@ -129,14 +75,15 @@ impl Unit {
         match (shape.per(k), driver.kind().per()) {
             (Per::Rate, _) => match (component, driver_axis) {
                 (InternalUnit::Millimetre, Some(AxisKind::Linear)) | (InternalUnit::Radian, Some(AxisKind::Rotary)) => {
-                    Unit { name: "ms".to_string(), display_per_internal: 1e3 }
+                    Unit::Millisecond.into()
                 }
                 (_, Some(AxisKind::Linear)) => per("(mm/s)"),
                 _ => per("(rad/s)"),
             },
             (Per::Hour, _) => per("h"),
             (Per::Slope(scale), _) if matches!(driver, Driver::Axis(_)) && driver_axis == Some(AxisKind::Linear) => {
-                Unit { display_per_internal: MM_PER_M / scale * plain.display_per_internal, ..per("m") }
+                let per_metre = Unit::Metre.internal() / scale * plain.display_per_internal;
+                ParameterUnit { display_per_internal: per_metre, ..per("m") }
             }
             (Per::Power(degree), Some(unit)) => per_power(unit, degree),
             (Per::Slope(1.0), Some(unit)) => per(unit),
@@ -156,7 +103,7 @@ mod tests {
         use InternalUnit::{Millimetre, Radian, Ratio};
         let axis = |name: &str| Driver::Axis(name.to_string());
         let name = |component, driver: &Driver, kind, shape: &Shape, k| {
-            Unit::of_coefficient(component, driver, kind, shape, k).name
+            ParameterUnit::of_coefficient(component, driver, kind, shape, k).name
         };
         let cubic = |scale: f64| Shape::Polynomial(Polynomial { degree: 3, scale });
         let square = |scale: f64| Shape::Power(Power { degree: 2, scale });
@@ -175,7 +122,7 @@ mod tests {
         // A slope over a linear axis is per length, whatever its scale.
         let scale_error = Shape::Polynomial(Polynomial { degree: 1, scale: 100.0 });
         assert_eq!(name(Millimetre, &axis("X"), linear, &scale_error, 0), "um/m");
-        let unit = Unit::of_coefficient(Millimetre, &axis("X"), linear, &scale_error, 0);
+        let unit = ParameterUnit::of_coefficient(Millimetre, &axis("X"), linear, &scale_error, 0);
         assert_eq!(unit.display_per_internal, 1e4);
         assert_eq!(name(Radian, &axis("X"), linear, &scale_error, 0), "arcsec/m");
         assert_eq!(name(Radian, &axis("X"), linear, &square(100.0), 0), "arcsec");

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::frames::{Coordinate, Point, SinCos, cross_nominal, turn_about_nominal};
 use crate::scalar::{Nominal, Scalar};
+use crate::unit::Unit;
 
 /// Whether an axis is linear or rotary. Its positions are in mm or radians.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
@@ -37,27 +38,21 @@ impl AxisKind {
     }
 
     /// `mm` or `deg`: the display unit of a position.
-    pub fn unit(self) -> &'static str {
+    pub fn unit(self) -> Unit {
         match self {
-            AxisKind::Linear => "mm",
-            AxisKind::Rotary => "deg",
+            AxisKind::Linear => Unit::Millimetre,
+            AxisKind::Rotary => Unit::Degree,
         }
     }
 
     /// Converts a position from mm or degrees to mm or radians.
     pub fn to_internal(self, position: f64) -> f64 {
-        match self {
-            AxisKind::Linear => position,
-            AxisKind::Rotary => position.to_radians(),
-        }
+        self.unit().to_internal(position)
     }
 
     /// Converts a position from mm or radians to mm or degrees.
     pub fn to_display(self, position: f64) -> f64 {
-        match self {
-            AxisKind::Linear => position,
-            AxisKind::Rotary => position.to_degrees(),
-        }
+        self.unit().to_display(position)
     }
 }
 

@@ -5,6 +5,8 @@
 
 use std::fmt;
 
+use crate::unit::InternalUnit;
+
 /// One of the six degrees of freedom of a rigid body: translations along and rotations about R's X, Y, Z.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[allow(missing_docs)]
@@ -24,6 +26,11 @@ impl Freedom {
     /// The index, 0 to 5.
     pub fn index(self) -> usize {
         self as usize
+    }
+
+    /// The unit of its errors: mm or rad.
+    pub fn unit(self) -> InternalUnit {
+        if self.is_angle() { InternalUnit::Radian } else { InternalUnit::Millimetre }
     }
 
     /// Whether it is a rotation (A, B, C).

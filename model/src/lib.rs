@@ -9,7 +9,7 @@
 //! - [`sensitivity`]: readings and their derivatives by every component; [`replay`]: evaluation over columns of
 //!   readings;
 //! - [`session`]: machine, tests and readings; [`document`]: the keys of their files;
-//! - [`median`]: the median; [`words`]: counts in messages; [`calendar`]: dates and times of day in texts; [`quantity`]: units of files.
+//! - [`median`]: the median; [`words`]: counts in messages; [`calendar`]: dates and times of day in texts; [`unit`]: units.
 //!
 //! The chain over plain and dual numbers: the reading of a ball bar, and its derivative by a location error of C,
 //! ∂L/∂EX0C = −R·sin C/L₀.
@@ -66,12 +66,12 @@ pub mod instrument;
 pub mod median;
 pub mod pattern;
 pub mod pose;
-pub mod quantity;
 pub mod replay;
 pub mod rotation_error;
 pub mod scalar;
 pub mod sensitivity;
 pub mod session;
+pub mod unit;
 pub mod words;
 
 pub use error::ModelError;

@@ -16,7 +16,7 @@ use abbe_identify::IdentifyError;
 use abbe_identify::linear::{Linearisation, is_of_interest};
 use abbe_identify::numerics::ranking::largest_first;
 use abbe_identify::problem::Problem;
-use abbe_identify::unit::Unit;
+use abbe_identify::unit::ParameterUnit;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::effect::shape::Harmonic;
 use abbe_model::effect::{Component, Effect, Shape};
@@ -141,7 +141,7 @@ pub fn bias_table(problem: &Problem, effects: &[Effect]) -> Result<BiasTable, Pl
         let moved = &linear.covariance * (jacobian.transpose() * &changes);
         let remaining = &changes - jacobian * &moved;
         for (k, name) in effect.shape.coefficient_names().into_iter().enumerate() {
-            let unit = Unit::of_effect(&problem.session, effect, k);
+            let unit = ParameterUnit::of_effect(&problem.session, effect, k);
             let rms_um =
                 |column: faer::ColRef<'_, f64>| column.norm_l2() / root * whitened_um / unit.display_per_internal;
             let signal_um = rms_um(changes.col(k));

@@ -368,8 +368,7 @@ impl Template<'_> {
 /// `Y at 200 mm`.
 fn position(machine: &Machine, axis: usize, q: f64) -> String {
     let axis = &machine.axes[axis];
-    let unit = if axis.kind == AxisKind::Rotary { "°" } else { " mm" };
-    format!("{} at {}{unit}", axis.name, shown(axis.kind.to_display(q)))
+    format!("{} at {}", axis.name, axis.kind.unit().behind(shown(axis.kind.to_display(q))))
 }
 
 /// The candidates with two points in contact.
@@ -416,11 +415,10 @@ impl Contacts<'_> {
 
 fn moved_words(machine: &Machine, axis: usize, range: Range) -> String {
     let axis = &machine.axes[axis];
-    let unit = if axis.kind == AxisKind::Rotary { "°" } else { " mm" };
     let [from, to] = [range.from, range.to].map(|q| shown(axis.kind.to_display(q)));
     let ways = if range.both_directions { "" } else { " in one direction" };
     let feed = if range.feed == 1.0 { String::new() } else { format!(" at {} times the feed", range.feed) };
-    format!("{} from {from} to {to}{unit}{ways}{feed}", axis.name)
+    format!("{} from {from} to {}{ways}{feed}", axis.name, axis.kind.unit().behind(to))
 }
 
 fn shown(value: f64) -> String {

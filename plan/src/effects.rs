@@ -26,7 +26,7 @@ use abbe_identify::numerics::symmetric::Symmetric;
 use abbe_identify::numerics::tolerances::ROUNDING_OF_SQUARES;
 use abbe_identify::parameters::physical_size;
 use abbe_identify::problem::Problem;
-use abbe_identify::unit::Unit;
+use abbe_identify::unit::ParameterUnit;
 use abbe_trace::candidates::columns::{Columns, EffectColumns, chunked};
 use abbe_trace::candidates::library::{self, LibraryEffect};
 
@@ -143,7 +143,7 @@ fn judge(
 ) -> Result<EffectDetectability, PlanError> {
     let session = &problem.session;
     let effect = &candidate.effect;
-    let unit = Unit::of_effect(session, effect, 0);
+    let unit = ParameterUnit::of_effect(session, effect, 0);
     // The coefficient that moves the component by its physical size somewhere in the tests, whatever the scale of the
     // coefficient.
     let size = match effect.component.unit(&session.instrument_parameters()) {
@@ -191,7 +191,7 @@ fn judge(
     })
 }
 
-fn biases(problem: &Problem, moved: MatRef<'_, f64>, unit: &Unit) -> Vec<Bias> {
+fn biases(problem: &Problem, moved: MatRef<'_, f64>, unit: &ParameterUnit) -> Vec<Bias> {
     let mut biases: Vec<Bias> = problem
         .parameters
         .list

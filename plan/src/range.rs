@@ -67,16 +67,13 @@ pub fn shrinkages(problem: &Problem) -> Result<Vec<Shrinkage>, PlanError> {
             Ok(ratios.fold((0.0, 0), |most, next| if next.0 > most.0 { next } else { most }))
         };
         let kind = problem.session.machine.axes[axis].kind;
-        let (display_per_internal, unit) = match kind {
-            abbe_model::axis::AxisKind::Rotary => (1.0_f64.to_degrees(), "deg"),
-            abbe_model::axis::AxisKind::Linear => (1.0, "mm"),
-        };
+        let display_per_internal = kind.to_display(1.0);
         let none = worst(0.0)?;
         let mut shrinkage = Shrinkage {
             test: problem.tests[test].name.clone(),
             axis: problem.session.machine.axes[axis].name.clone(),
             range: [low * display_per_internal, high * display_per_internal].into(),
-            unit: unit.to_string(),
+            unit: kind.unit().to_string(),
             minimum_range: None,
             first_to_double: None,
         };

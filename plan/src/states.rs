@@ -6,11 +6,11 @@ use abbe_identify::heldout::Folds;
 use abbe_identify::noise::{Noise, NoiseSource};
 use abbe_identify::problem::Problem;
 use abbe_identify::start;
-use abbe_identify::unit::ReadingUnit;
 use abbe_model::instrument::Station;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test, motion, planned};
+use abbe_model::unit::Unit;
 
 use crate::PlanError;
 
@@ -78,7 +78,7 @@ pub(crate) fn assumed_noise() -> Noise {
 }
 
 /// The warning about a noise that the session does not state.
-pub(crate) fn noise_warning(noise: &Noise, unit: ReadingUnit) -> Option<String> {
+pub(crate) fn noise_warning(noise: &Noise, unit: Unit) -> Option<String> {
     let found = match noise.source {
         NoiseSource::Stated => return None,
         NoiseSource::Assumed => "is assumed",
@@ -86,7 +86,7 @@ pub(crate) fn noise_warning(noise: &Noise, unit: ReadingUnit) -> Option<String> 
             "is estimated from its data"
         }
     };
-    Some(format!("the session states no `{}`: {} {found}", unit.noise_key(), unit.text(noise.sigma_mm * 1e3, 2)))
+    Some(format!("the session states no `noise_{unit}`: {} {found}", unit.text(noise.sigma_mm * 1e3, 2)))
 }
 
 /// The noise model of a plan: that of the session, that of its data, or the assumed one.

@@ -11,9 +11,9 @@ use abbe::files;
 use abbe::files::robot::dh::Convention;
 use abbe::identify::model_file::errors::EstimatedErrors;
 use abbe::identify::model_file::{self, IdentifiedModel};
-use abbe::identify::unit::ARCSEC;
 use abbe::model::pose::Aim;
 use abbe::model::session::readings::Readings;
+use abbe::model::unit::{ARCSEC_PER_RAD, UM_PER_MM};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
@@ -140,8 +140,8 @@ impl Model {
         });
         let display: Vec<f64> = display.collect();
         let states = corrected.iter().map(|row| row.state.word()).collect();
-        let um: Vec<f64> = corrected.iter().map(|row| row.remaining_mm * 1e3).collect();
-        let arcsec: Vec<f64> = corrected.iter().map(|row| row.remaining_rad * ARCSEC).collect();
+        let um: Vec<f64> = corrected.iter().map(|row| row.remaining_mm * UM_PER_MM).collect();
+        let arcsec: Vec<f64> = corrected.iter().map(|row| row.remaining_rad * ARCSEC_PER_RAD).collect();
         let positions = display.into_pyarray(py).reshape([corrected.len(), machine.axes.len()])?;
         Ok((positions, states, um.into_pyarray(py), arcsec.into_pyarray(py)))
     }
@@ -160,7 +160,9 @@ impl Model {
             work::at_once(py, || Ok(self.correction(tool_mm, |correction| correction.pose_errors(&commands))?))?;
         let display = errors
             .iter()
-            .flat_map(|[x, y, z, a, b, c]| [x * 1e3, y * 1e3, z * 1e3, a * ARCSEC, b * ARCSEC, c * ARCSEC]);
+            .flatten()
+            .zip([[UM_PER_MM; 3], [ARCSEC_PER_RAD; 3]].into_iter().flatten().cycle())
+            .map(|(error, display)| error * display);
         display.collect::<Vec<f64>>().into_pyarray(py).reshape([errors.len(), 6])
     }
 }

@@ -12,7 +12,6 @@ use abbe::identify::noise::{Noise, NoiseSource};
 use abbe::identify::problem::{Problem, RowBlock};
 use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulation, simulate};
-use abbe::identify::unit::{ARCSEC, Unit};
 use abbe::model::component::ErrorName;
 use abbe::model::document::edit::SessionText;
 use abbe::model::document::node::Node;
@@ -22,6 +21,7 @@ use abbe::model::effect::Component;
 use abbe::model::instrument::channel::labels;
 use abbe::model::sensitivity::TestModel;
 use abbe::model::session::{self as domain, Prior};
+use abbe::model::unit::{ARCSEC_PER_RAD, Unit};
 use abbe::plan::states;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
@@ -207,13 +207,13 @@ impl Session {
         let mut readings = readings.as_ref().clone();
         readings.columns_to_channels(&state.session.machine, &found.station);
         for (first, (channel, label)) in channels.iter().zip(labels(channels)).enumerate() {
-            let (unit, per_internal) = if channel.is_angle() { ("arcsec", ARCSEC) } else { ("mm", 1.0) };
+            let unit = if channel.is_angle() { Unit::Arcsecond } else { Unit::Millimetre };
             let name = match label {
                 "" => format!("reading_{unit}"),
                 label => format!("{label}_reading_{unit}"),
             };
             let observed = readings.observed.iter().skip(first).step_by(channels.len());
-            columns.set_item(name, PyArray1::from_vec(py, observed.map(|value| value * per_internal).collect()))?;
+            columns.set_item(name, PyArray1::from_vec(py, observed.map(|value| unit.to_display(*value)).collect()))?;
         }
         Ok(columns)
     }
@@ -296,7 +296,7 @@ impl Session {
             });
             let given = given.collect::<Result<Vec<_>, Failed>>()?;
             let noise_mm = noise_um.map(|um| um * 1e-3);
-            let noise_rad = noise_arcsec.map(|arcsec| arcsec / ARCSEC);
+            let noise_rad = noise_arcsec.map(|arcsec| arcsec / ARCSEC_PER_RAD);
             let simulation = Simulation { given, noise_mm, noise_rad, draw_setups, seed };
             let simulated = simulate(&state.session, &simulation)?;
             let mut session = state.session.clone().with_readings(simulated.readings);
@@ -403,7 +403,7 @@ fn unit_of(state: &State, id: &str) -> Result<String, Failed> {
     }
     let component = ErrorName::parse(id).map(Component::Axis);
     let unit = component.and_then(|component| component.unit(state.session.instrument.unknowns()));
-    unit.map(|unit| Unit::of(unit).name).ok_or_else(|| {
+    unit.map(|unit| unit.displayed().name().to_string()).ok_or_else(|| {
         Failed::argument(
             format!("`{id}` has no unit that follows from its name"),
             "write number and unit as a text, such as \"1.5um\"",

@@ -4,7 +4,7 @@ use abbe_identify::IdentifyError;
 use abbe_identify::fit::{Fit, assume};
 use abbe_identify::plausibility::accepted;
 use abbe_identify::problem::Problem;
-use abbe_identify::results::{ParameterResult, Statements};
+use abbe_identify::results::{Estimate, Statements};
 use abbe_plan::attainable;
 use abbe_trace::SessionFit;
 use serde::{Deserialize, Serialize};
@@ -71,7 +71,7 @@ fn stated(found: &SessionFit) -> StatedFit<'_> {
 }
 
 /// The tables of estimates: errors and effects, then the set-up.
-pub fn estimates(problem: &Problem, fit: &Fit, of: &[ParameterResult]) -> Vec<Table> {
+pub fn estimates(problem: &Problem, fit: &Fit, of: &[Estimate]) -> Vec<Table> {
     let estimates = Estimates::new(problem, fit, of);
     let setup = (!estimates.setup.is_empty()).then(|| estimates.setup_table(None));
     std::iter::once(table(&estimates.errors, None)).chain(setup).collect()

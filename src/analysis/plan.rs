@@ -2,9 +2,9 @@
 
 use abbe_identify::IdentifyError;
 use abbe_identify::problem::Problem;
-use abbe_model::instrument::InternalUnit;
 use abbe_model::session::limits::{LARGEST, MIN_UM};
 use abbe_model::session::{Prior, Session};
+use abbe_model::unit::InternalUnit;
 use abbe_plan::results::PlanAnalysis;
 use abbe_plan::{PlanError, PlanOptions, analyse, collision, prepared, states};
 use serde::{Deserialize, Serialize};

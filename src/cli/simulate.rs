@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use abbe::files::{self, Changes, with_readings};
 use abbe::identify::quantity::{self, Given};
 use abbe::identify::simulate::{Simulation, SimulationResult, simulate};
-use abbe::identify::unit::ARCSEC;
+use abbe::model::unit::ARCSEC_PER_RAD;
 use clap::Args;
 
 use super::failure::Failure;
@@ -83,7 +83,7 @@ pub fn run(arguments: &SimulateArguments, _: Global) -> Result<(), Failure> {
     let simulation = Simulation {
         given,
         noise_mm: arguments.noise_um.map(|noise_um| noise_um * 1e-3),
-        noise_rad: arguments.noise_arcsec.map(|arcsec| arcsec / ARCSEC),
+        noise_rad: arguments.noise_arcsec.map(|arcsec| arcsec / ARCSEC_PER_RAD),
         draw_setups: arguments.draw_setups,
         seed: arguments.common.seed,
     };

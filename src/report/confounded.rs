@@ -1,7 +1,7 @@
 //! What the readings leave open: null-space directions, and readings that are excluded.
 
 use abbe::identify::results::{DeterminedByPrior, Finding, ModelResult, Outlier, Unobservable};
-use abbe::identify::unit::ReadingUnit;
+use abbe::model::unit::Unit;
 use abbe::model::words::counted;
 
 use super::block::{Level, Report, Text};
@@ -61,7 +61,7 @@ pub fn section(report: &mut Report, model: &ModelResult) {
 }
 
 /// The readings that are excluded as outliers; without `--all`, those with the largest residual.
-fn outliers(outliers: &[Outlier], unit: ReadingUnit) -> Table {
+fn outliers(outliers: &[Outlier], unit: Unit) -> Table {
     let firsts = outliers.iter().filter(|outlier| outlier.first_at_reversal).count();
     let readings = counted(outliers.len(), "reading");
     let begin = "a run that begins where an axis reverses, so that its lost motion there is not known";

@@ -1,7 +1,7 @@
 //! Held-out errors by what is held out, in words: interpolation and extrapolation of poses, left-out tests.
 
 use abbe::identify::results::ModelResult;
-use abbe::identify::unit::ReadingUnit;
+use abbe::model::unit::Unit;
 use abbe::model::words::first_of;
 
 use super::number::of_readings;
@@ -14,7 +14,7 @@ pub struct HeldOutFigure {
     /// What it tests.
     pub name: &'static str,
     /// Its unit.
-    pub unit: ReadingUnit,
+    pub unit: Unit,
     /// Over scalar readings.
     pub rms_um: f64,
     /// Of the vector, for instruments with three coordinates.

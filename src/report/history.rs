@@ -254,7 +254,7 @@ fn changes(machines: &[MachineHistory]) -> Table {
 fn amounts(machine: &MachineHistory, change: &ChangeEvent) -> String {
     let found = change.changes.iter().filter(|own| change.parameters.contains(&own.id));
     let amount = |own: &ParameterChange| {
-        let Estimate { value, u } = machine.amount(change, &own.id)?;
+        let MeasuredValue { value, u } = machine.amount(change, &own.id)?;
         let (value, u) = value_and_u(value, u);
         Some(format!("{} {}", own.id, quantity(&format!("{value} ± {u}"), &own.unit)))
     };

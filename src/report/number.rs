@@ -1,7 +1,7 @@
 //! Numbers and units as people read them: digits by the uncertainty, symbols of units.
 
 use abbe::identify::results::ShapeParameter;
-use abbe::identify::unit::ReadingUnit;
+use abbe::model::unit::Unit;
 
 /// A number with decimal places. A number that rounds to zero has no sign.
 pub fn fixed(value: f64, places: usize) -> String {
@@ -60,23 +60,18 @@ pub fn p_equals(p: f64) -> String {
 
 /// A residual or a noise figure in µm.
 pub fn micrometres(value_um: f64) -> String {
-    of_readings(value_um, ReadingUnit::Micrometre)
+    of_readings(value_um, Unit::Micrometre)
 }
 
 /// A residual or a noise figure in the unit of the readings.
-pub fn of_readings(value: f64, of: ReadingUnit) -> String {
+pub fn of_readings(value: f64, of: Unit) -> String {
     let places = if value >= 100.0 { 1 } else { 3 };
-    format!("{value:.places$} {}", unit(of.name()))
+    of.text(value, places)
 }
 
 /// A unit, or a text with units, with its symbols: `um` becomes µm, `arcsec` becomes ″, `deg` becomes °.
 pub fn unit(text: &str) -> String {
-    let symbol = |word: &str| match word {
-        "um" => "µm".to_string(),
-        "arcsec" => "″".to_string(),
-        "deg" => "°".to_string(),
-        other => other.to_string(),
-    };
+    let symbol = |word: &str| Unit::parse(word).map_or_else(|| word.to_string(), |unit| unit.symbol().to_string());
     text.split_inclusive(|c: char| !c.is_alphanumeric())
         .map(|part| match part.char_indices().last() {
             Some((end, last)) if !last.is_alphanumeric() => symbol(&part[..end]) + &part[end..],

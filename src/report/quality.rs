@@ -3,7 +3,7 @@
 use abbe::identify::noise::{NoiseSource, ReadingNoise};
 use abbe::identify::problem::Problem;
 use abbe::identify::results::{Goodness, GoodnessVerdict, ModelResult, NotJudged};
-use abbe::identify::unit::ReadingUnit;
+use abbe::model::unit::Unit;
 use abbe::model::words::counted;
 
 use super::block::KeyFigure;
@@ -42,7 +42,7 @@ pub fn key_figures(model: &ModelResult, before: Option<&ModelResult>) -> Vec<Key
         figures.push(KeyFigure::new("3-vector", shown(rms), format!("held out {}", shown(held))));
     }
     if let Some(angles) = model.of_angles {
-        let in_arcsec = |value: f64| of_readings(value, ReadingUnit::Arcsecond);
+        let in_arcsec = |value: f64| of_readings(value, Unit::Arcsecond);
         let [rms, held, noise] = [angles.rms_arcsec, angles.heldout_rms_arcsec, angles.noise_arcsec].map(in_arcsec);
         figures.push(KeyFigure::new("Angles, rms", rms, format!("held out {held}, noise {noise}")));
     }

@@ -4,7 +4,6 @@ use abbe::identify::IdentifyError;
 use abbe::identify::directions::{DirectionFrame, views};
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
-use abbe::identify::unit::Unit;
 use abbe::model::instrument::channel;
 use abbe::model::session::readings::Readings;
 
@@ -71,7 +70,7 @@ pub fn residuals(problem: &Problem, fit: &Fit) -> Table {
                     found.map_or("".into(), |value| Cell::fixed(value, places_of_decimals))
                 }));
             };
-            let display = |channel: usize| Unit::of(channels[channel].unit).display_per_internal;
+            let display = |channel: usize| channels[channel].unit.displayed().per_internal();
             let read = |k: usize| readings.observed.get(k).copied().filter(|value| !value.is_nan());
             let unit = |channel: usize| if channels[channel].is_angle() { display(channel) } else { 1.0 };
             column(&|k, channel| Some(read(k)? / model.weights()[channel] * unit(channel)), 6);

@@ -1,8 +1,8 @@
 //! A simulated session and the true values of its parameters.
 
 use abbe::identify::simulate::Simulated;
-use abbe::identify::unit::{ARCSEC, ReadingUnit};
 use abbe::model::session::Session;
+use abbe::model::unit::{ARCSEC_PER_RAD, UM_PER_MM, Unit};
 use abbe::model::words::counted;
 
 use super::block::Report;
@@ -16,8 +16,8 @@ pub fn report(session: &Session, file: &str, simulated: &Simulated, seed: u64) -
     report.method = "Readings of the machine with the stated errors, with Gaussian noise.".to_string();
     let readings: usize = simulated.readings.iter().map(|readings| readings.rows()).sum();
     let units = session.units();
-    let lengths = of_readings(simulated.noise_mm * 1e3, ReadingUnit::Micrometre);
-    let angles = of_readings(simulated.noise_rad * ARCSEC, ReadingUnit::Arcsecond);
+    let lengths = of_readings(simulated.noise_mm * UM_PER_MM, Unit::Micrometre);
+    let angles = of_readings(simulated.noise_rad * ARCSEC_PER_RAD, Unit::Arcsecond);
     let noise = match (units.lengths, units.angles) {
         (true, true) => format!("{lengths} and {angles}"),
         (false, true) => angles,

@@ -1,7 +1,7 @@
 //! What a trace does now, in words.
 
 use abbe_identify::plausibility::Plausibility;
-use abbe_identify::unit::ReadingUnit;
+use abbe_model::unit::Unit;
 use abbe_model::words::counted;
 
 /// Progress of a trace.
@@ -16,7 +16,7 @@ pub enum Progress {
     /// Draws of the null distribution of the search that are formed, and their number.
     NullDraws(usize, usize),
     /// An effect was added: the number of effects, its identifier, the held-out rms in µm.
-    SelectedEffect(usize, String, f64, ReadingUnit),
+    SelectedEffect(usize, String, f64, Unit),
     /// Searches without one fold that have ended, and their number. Each predicts the readings that it lacks.
     Folds(usize, usize),
     /// The model with the found effects is being refitted, and its residual tested.

@@ -125,10 +125,7 @@ impl TestResidual<'_> {
             let width = share * (high - low);
             for k in 0..(0.5 / share) as usize {
                 let centre = low + (high - low) * (k as f64 + 0.5) * 2.0 * share;
-                let place = match axis.kind {
-                    AxisKind::Rotary => format!("{:.1}°", centre.to_degrees()),
-                    AxisKind::Linear => format!("{centre:.1} mm"),
-                };
+                let place = axis.kind.unit().behind(format_args!("{:.1}", axis.kind.to_display(centre)));
                 let shape = Shape::Local(Local { centre, width, recurs: None });
                 self.add(&driver, shape, format!("a local feature at {name} = {place} in {test}"));
             }

@@ -9,6 +9,7 @@ use abbe::import::{ImportOptions, ImportResult, Imported, Target, import};
 use abbe::model::axis::AxisKind;
 use abbe::model::instrument::{Fault, kinds};
 use abbe::model::session::Session;
+use abbe::model::unit::Unit;
 use serde::{Deserialize, Serialize};
 use wasm_bindgen::prelude::*;
 
@@ -119,8 +120,8 @@ fn columns(session: &Session) -> Vec<String> {
     let station = session.tests.first().map(|test| test.station.columns()).unwrap_or_default();
     let readings = station.iter().map(|column| {
         let units = match column.unit {
-            "" => &[][..],
-            "arcsec" | "deg" => ANGLES,
+            Unit::One => &[][..],
+            unit if unit.is_angle() => ANGLES,
             _ => LENGTHS,
         };
         (column.stem.to_string(), units)

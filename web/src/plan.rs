@@ -67,8 +67,7 @@ impl Plan {
         let session = &self.problem.session;
         let machine = &session.machine;
         let axes = machine.axes.iter().map(|axis| {
-            let unit = if axis.kind == AxisKind::Rotary { "deg" } else { "mm" };
-            json!({ "name": axis.name, "unit": unit, "direction": axis.direction, "origin_mm": axis.origin_mm })
+            json!({ "name": axis.name, "unit": axis.kind.unit(), "direction": axis.direction, "origin_mm": axis.origin_mm })
         });
         let paths = paths::set_ups(&self.problem);
         let tests = self.problem.tests.iter().zip(&paths).map(|(test, path)| {

@@ -204,7 +204,7 @@ pub fn of_model(model: &IdentifiedModel, references: &[(String, f64)]) -> Result
         let within = [range[0], range[1]].map(|end| kind.to_display(end));
         if let Some(found) = stated.filter(|place| !(within[0]..=within[1]).contains(place)) {
             let name = format!("the reference position of {} in the table of {error}", error.axis);
-            return Err(IdentifyError::OutOfRange { name, found, range: within, unit: kind.unit() }.into());
+            return Err(IdentifyError::OutOfRange { name, found, range: within, unit: kind.unit().name() }.into());
         }
         let stated = stated.map(|place| kind.to_internal(place));
         let zero = stated.or((!(range[0]..=range[1]).contains(&0.0)).then_some(range[0]));

@@ -5,7 +5,6 @@ use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 
 use super::curves::{Compensation, positions};
-use abbe_identify::unit::ARCSEC;
 
 /// A point of a curve with its standard uncertainty (k = 1).
 pub struct PointUncertainty {
@@ -30,7 +29,7 @@ pub(super) fn of_curves(machine: &Machine, compensation: &Compensation, points: 
     let mut found = Vec::new();
     for curve in &compensation.curves {
         let axis = machine.axes[curve.axis].kind;
-        let (unit, per_internal) = if curve.error.freedom.is_angle() { ("arcsec", ARCSEC) } else { ("um", 1e3) };
+        let unit = curve.error.freedom.unit().displayed();
         let directions: &[Option<f64>] = if curve.is_directional() { &[Some(1.0), Some(-1.0)] } else { &[None] };
         for direction in directions {
             let towards = direction.unwrap_or(1.0);
@@ -39,9 +38,9 @@ pub(super) fn of_curves(machine: &Machine, compensation: &Compensation, points: 
                 axis,
                 position: axis.to_display(q),
                 direction: *direction,
-                value: curve.at(q, towards) * per_internal,
-                u: curve.u_at(q, towards) * per_internal,
-                unit,
+                value: unit.to_display(curve.at(q, towards)),
+                u: unit.to_display(curve.u_at(q, towards)),
+                unit: unit.name(),
             }));
         }
     }

@@ -5,9 +5,9 @@ use std::io::Write;
 use abbe_files::commands::{Block, CommandFile, PoseColumns};
 use abbe_identify::IdentifyError;
 use abbe_identify::numerics::parallel;
-use abbe_identify::unit::ARCSEC;
 use abbe_model::pose::{Aim, Pose, reach};
 use abbe_model::session::readings::Readings;
+use abbe_model::unit::{ARCSEC_PER_RAD, UM_PER_MM};
 use csv::StringRecord;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
@@ -273,7 +273,7 @@ impl Layout {
         let mut results = Vec::with_capacity(block.cells.len());
         let before = |error: &[f64; 6]| {
             let length = |part: &[f64]| part.iter().map(|value| value * value).sum::<f64>().sqrt();
-            [1e3 * length(&error[..3]), ARCSEC * length(&error[3..])]
+            [UM_PER_MM * length(&error[..3]), ARCSEC_PER_RAD * length(&error[3..])]
         };
         match self.output {
             Output::Error => {
@@ -283,7 +283,7 @@ impl Layout {
                     let usable = state == State::Corrected;
                     self.cells(&mut text, file, &block.cells[row], &block.rows, row, usable, false);
                     for (part, value) in error.iter().enumerate() {
-                        let scale = if part < 3 { 1e3 } else { ARCSEC };
+                        let scale = if part < 3 { UM_PER_MM } else { ARCSEC_PER_RAD };
                         let _ = if usable { write!(text, ",{:.6}", value * scale) } else { write!(text, ",") };
                     }
                     let _ = writeln!(text, ",{}", if usable { "evaluated" } else { state.word() });
@@ -304,7 +304,7 @@ impl Layout {
                     let usable = !matches!(state, State::NotANumber | State::NotReachable);
                     let replaced = usable && state != State::NotCorrectable;
                     self.cells(&mut text, file, &block.cells[row], &commands, row, usable, replaced);
-                    let [um, arcsec] = [1e3 * found.remaining_mm, ARCSEC * found.remaining_rad];
+                    let [um, arcsec] = [UM_PER_MM * found.remaining_mm, ARCSEC_PER_RAD * found.remaining_rad];
                     let _ = match usable {
                         // A singular matrix has no condition.
                         true if !found.condition.is_finite() => {

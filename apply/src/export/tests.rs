@@ -9,6 +9,7 @@ use abbe_identify::unit::Unit;
 use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::frames::Point;
 use abbe_model::session::Prior;
+use abbe_model::unit::Unit;
 use faer::Mat;
 use nalgebra::{Matrix4, Rotation3, Vector3};
 use rand::{Rng, RngExt, SeedableRng};
@@ -23,7 +24,7 @@ pub(super) fn model(machine: Machine, errors: &[(String, f64)]) -> IdentifiedMod
         .map(|(id, value)| ModelParameter {
             id: id.clone(),
             role: Role::Error,
-            unit: Unit::of(abbe_model::instrument::InternalUnit::Millimetre),
+            unit: Unit::Micrometre.into(),
             value: *value,
             held: false,
             identifiable: true,

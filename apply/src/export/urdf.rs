@@ -9,6 +9,7 @@ use std::fmt::Write;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
+use abbe_model::unit::Unit;
 use nalgebra::Isometry3;
 
 use super::entries::best_locations;
@@ -17,8 +18,6 @@ use super::left_out;
 use crate::ApplyError;
 use abbe_identify::model_file::IdentifiedModel;
 
-/// Metres per millimetre.
-const METRE: f64 = 1e-3;
 /// Mass and inertia of a link. URDF has no place for a link without them in simulators of dynamics.
 const MASS_KG: f64 = 1.0;
 
@@ -82,7 +81,7 @@ fn branch(line: Line<'_>, machine: &Machine, branch: &Branch, end: &str) {
         let [x, y, z]: [f64; 3] = joint.direction.normalize().into();
         line(4, format_args!("<axis xyz=\"{x:?} {y:?} {z:?}\"/>"));
         if kind != "continuous" {
-            let scale = if axis.kind == AxisKind::Linear { METRE } else { 1.0 };
+            let scale = if axis.kind == AxisKind::Linear { Unit::Metre.per_internal() } else { 1.0 };
             let [low, high] = axis.travel.unwrap_or([-10_000.0, 10_000.0]).map(|end| end * scale);
             line(4, format_args!("<limit lower=\"{low:?}\" upper=\"{high:?}\" effort=\"0\" velocity=\"0\"/>"));
         }
@@ -99,7 +98,7 @@ fn branch(line: Line<'_>, machine: &Machine, branch: &Branch, end: &str) {
 }
 
 fn origin(line: Line<'_>, pose: &Isometry3<f64>) {
-    let [x, y, z]: [f64; 3] = (pose.translation.vector * METRE).into();
+    let [x, y, z]: [f64; 3] = (pose.translation.vector * Unit::Metre.per_internal()).into();
     let [roll, pitch, yaw] = roll_pitch_yaw(&pose.rotation);
     line(4, format_args!("<origin xyz=\"{x:?} {y:?} {z:?}\" rpy=\"{roll:?} {pitch:?} {yaw:?}\"/>"));
 }

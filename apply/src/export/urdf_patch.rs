@@ -10,14 +10,13 @@ use abbe_files::robot::urdf::{self, UrdfJoint};
 use abbe_identify::IdentifyError;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_model::axis::AxisKind;
+use abbe_model::unit::Unit;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::entries::best_locations;
 use super::frames::{JointFrame, roll_pitch_yaw, tool_side};
 use crate::ApplyError;
 
-/// Metres per millimetre.
-const METRE: f64 = 1e-3;
 /// Largest distance between an axis of the file and of the model's machine, mm; and of their directions.
 const SAME_MM: f64 = 1e-3;
 const SAME_DIRECTION: f64 = 1e-6;
@@ -113,7 +112,7 @@ fn refuse_another(model: &IdentifiedModel, chain: &Chain) -> Result<(), ApplyErr
 
 /// Writes the origin of a joint in the place of the old one.
 fn write(text: &mut String, joint: &UrdfJoint, origin: &Isometry3<f64>) {
-    let [x, y, z]: [f64; 3] = (origin.translation.vector * METRE).into();
+    let [x, y, z]: [f64; 3] = (origin.translation.vector * Unit::Metre.per_internal()).into();
     let [roll, pitch, yaw] = roll_pitch_yaw(&origin.rotation);
     let (xyz, rpy) = (format!("xyz=\"{x:?} {y:?} {z:?}\""), format!("rpy=\"{roll:?} {pitch:?} {yaw:?}\""));
     match &joint.origin_bytes {

@@ -6,13 +6,12 @@ use std::path::Path;
 use abbe_files::Source;
 use abbe_files::read::lowered;
 use abbe_identify::quantity::Given;
-use abbe_identify::unit::{ARCSEC, Unit};
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{ERRORS_PER_AXIS, Machine};
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::document::fault::{Fault, Within};
 use abbe_model::document::value::{Long, Positive};
-use abbe_model::instrument::InternalUnit;
+use abbe_model::unit::Unit;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -213,8 +212,8 @@ pub fn of_source(source: &Source, machine: &Machine) -> Result<Vec<ErrorFunction
 
 fn constant(machine: &Machine, id: &str, quantity: &str) -> Result<ErrorFunction, Fault> {
     let (slot, over, angle) = error_slot_of(machine, id)?;
-    let unit = Unit::of(if angle { InternalUnit::Radian } else { InternalUnit::Millimetre });
-    let inside = Given::of(id, quantity).and_then(|given| given.inside(&unit));
+    let unit = if angle { Unit::Arcsecond } else { Unit::Micrometre };
+    let inside = Given::of(id, quantity).and_then(|given| given.inside(&unit.into()));
     let form = Form::Constant(inside.map_err(|fault| Fault::new(fault.to_string(), None))?);
     Ok(ErrorFunction { slot, over, form })
 }
@@ -323,10 +322,9 @@ fn of_axis<'v, T>(kind: AxisKind, stem: &str, mm: &'v Option<T>, deg: &'v Option
 
 /// Values of an error, mm or rad.
 fn values(angle: bool, um: Option<&[f64]>, arcsec: Option<&[f64]>) -> Result<Vec<f64>, Fault> {
-    let (right, wrong, per_internal, word) =
-        if angle { (arcsec, um, ARCSEC, "arcsec") } else { (um, arcsec, 1e3, "um") };
+    let (right, wrong, unit) = if angle { (arcsec, um, Unit::Arcsecond) } else { (um, arcsec, Unit::Micrometre) };
     match (right, wrong) {
-        (Some(values), None) if !values.is_empty() => Ok(values.iter().map(|value| value / per_internal).collect()),
-        _ => Err(Fault::new(format!("the values of this error must be in `{word}`"), None)),
+        (Some(values), None) if !values.is_empty() => Ok(values.iter().map(|value| unit.to_internal(*value)).collect()),
+        _ => Err(Fault::new(format!("the values of this error must be in `{unit}`"), None)),
     }
 }

@@ -10,7 +10,6 @@
 pub mod functions;
 mod results;
 
-use abbe_model::axis::AxisKind;
 use abbe_model::chain::{BodyErrors, ERRORS_PER_AXIS, Machine};
 use abbe_model::frames::Point;
 use abbe_model::sensitivity::SlotValues;
@@ -190,10 +189,6 @@ pub fn map(
     let points: Vec<(VolumetricPoint, Vec<f64>)> = points.into_iter().collect::<Result<_, ApplyError>>()?;
     let machine = machine_with_errors.machine;
     let largest = points.iter().max_by(|(a, _), (b, _)| norm(a.error_mm).total_cmp(&norm(b.error_mm)));
-    let outside = |axis: usize, q: f64| match machine.axes[axis].kind {
-        AxisKind::Linear => q,
-        AxisKind::Rotary => q.to_degrees(),
-    };
     let residual = compensate.then(|| {
         let compensated_points = points.iter().filter_map(|(point, _)| point.compensated.as_ref());
         Size::of(compensated_points.map(|compensated| norm(compensated.error_mm)))
@@ -203,15 +198,12 @@ pub fn map(
         points: total,
         error: Size::of(points.iter().map(|(point, _)| norm(point.error_mm))),
         largest_at: largest.map_or(Vec::new(), |(point, _)| {
-            let named = machine.axes.iter().zip(&point.positions).enumerate();
+            let named = machine.axes.iter().zip(&point.positions);
             named
-                .map(|(k, (axis, q))| MapPosition {
+                .map(|(axis, q)| MapPosition {
                     axis: axis.name.clone(),
-                    position: outside(k, *q),
-                    unit: match axis.kind {
-                        AxisKind::Linear => "mm".to_string(),
-                        AxisKind::Rotary => "deg".to_string(),
-                    },
+                    position: axis.kind.to_display(*q),
+                    unit: axis.kind.unit().to_string(),
                 })
                 .collect()
         }),

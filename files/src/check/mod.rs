@@ -12,6 +12,7 @@ use abbe_model::instrument::{Checked, Fault};
 use abbe_model::session::motion::Motion;
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test, planned};
+use abbe_model::unit::Unit;
 
 /// Least number of readings of a test.
 pub(crate) const MIN_READINGS: usize = 2;
@@ -95,12 +96,13 @@ fn of_another_unit(machine: &Machine, motion: Option<&Motion>, readings: &Readin
     let positions = readings.positions[*axis].iter().copied();
     let span = positions.clone().fold(f64::NEG_INFINITY, f64::max) - positions.fold(f64::INFINITY, f64::min);
     let axis = &machine.axes[*axis];
-    let (units, column) = match axis.kind {
-        AxisKind::Rotary => (&[(180.0 / std::f64::consts::PI, "radians")][..], "deg"),
-        AxisKind::Linear => (&[(1e3, "metres"), (25.4, "inches")][..], "mm"),
+    let (units, column): (&[(Unit, &str)], Unit) = match axis.kind {
+        AxisKind::Rotary => (&[(Unit::Radian, "radians")], Unit::Degree),
+        AxisKind::Linear => (&[(Unit::Metre, "metres"), (Unit::Inch, "inches")], Unit::Millimetre),
     };
     let stated = (to - from).abs();
-    let (_, unit) = units.iter().find(|(factor, _)| (stated / span / factor - 1.0).abs() < NEAR_FACTOR)?;
+    let is_near = |factor: f64| (stated / span / factor - 1.0).abs() < NEAR_FACTOR;
+    let (_, unit) = units.iter().find(|(unit, _)| unit.convert(1.0, column).is_some_and(is_near))?;
     let [span, stated] = [span, stated].map(|span| axis.kind.to_display(span));
     Some(format!(
         "axis `{}` covers {span:.3} {column} where the session states {stated:.3} {column}, as {unit} in a column of {column} would",

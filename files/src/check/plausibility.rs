@@ -6,6 +6,7 @@ use abbe_model::chain::{BodyErrors, Machine};
 use abbe_model::instrument::{Checked, Fault};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Prior, Test};
+use abbe_model::unit::Unit;
 
 /// Checks that the instrument nominally fits: the distance between the balls is the length of the bar, the stylus is in
 /// front of its artefact, the ball is in its nest. If a single mistake in the positions of an axis (its sign, its unit, its
@@ -28,18 +29,18 @@ const SIGN: &str = "with the opposite sign (check its `direction` and its column
 /// Mistakes that are tried on linear axes. Sign and unit errors both multiply the positions by a factor.
 const LINEAR: [Mistake; 7] = [
     (-1.0, SIGN),
-    (1e3, "in m rather than mm"),
-    (1e-3, "in µm rather than mm"),
-    (25.4, "in inches rather than mm"),
-    (0.0254, "in mil rather than mm"),
-    (1.0 / 25.4, "in mm rather than inches"),
-    (1.0 / 0.0254, "in mm rather than mil"),
+    (Unit::Metre.internal(), "in m rather than mm"),
+    (Unit::Micrometre.internal(), "in µm rather than mm"),
+    (Unit::Inch.internal(), "in inches rather than mm"),
+    (Unit::Mil.internal(), "in mil rather than mm"),
+    (Unit::Inch.per_internal(), "in mm rather than inches"),
+    (Unit::Mil.per_internal(), "in mm rather than mil"),
 ];
 /// Mistakes that are tried on rotary axes.
 const ROTARY: [Mistake; 3] = [
     (-1.0, SIGN),
-    (180.0 / std::f64::consts::PI, "in radians rather than degrees"),
-    (std::f64::consts::PI / 180.0, "in degrees rather than radians"),
+    (Unit::Degree.per_internal(), "in radians rather than degrees"),
+    (Unit::Degree.internal(), "in degrees rather than radians"),
 ];
 
 /// Largest number of readings on which mistakes are tried.

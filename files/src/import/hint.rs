@@ -5,13 +5,14 @@ use abbe_model::document::layout::ForeignColumn;
 use abbe_model::document::value::Count;
 use abbe_model::driver::column as driver;
 use abbe_model::instrument::Fault;
+use abbe_model::unit::{Dimension, Unit};
 
 use super::Expected;
 use super::grid::Grid;
 use super::meaning::{Found, Meaning, names_of, reading, time, unit_of_cells};
-use super::unit::{self, Dimension, Unit};
+use super::unit;
 use super::words;
-use crate::quantity;
+use crate::axes;
 use crate::spelling::suggestion;
 use crate::table::columns::listed;
 
@@ -125,18 +126,18 @@ fn meaning(own: &str, grid: &Grid, column: usize, expected: &Expected<'_>) -> Re
             None => Err((format!("`{own}` is no driver column"), driver::help_on_name())),
         };
     }
-    if let Some(column) = columns.iter().find(|column| column.unit.is_empty() && column.stem == plain) {
+    if let Some(column) = columns.iter().find(|column| column.unit == Unit::One && column.stem == plain) {
         return Ok((reading(column), None));
     }
     let found = plain.rsplit_once('_').and_then(|(stem, word)| {
         let unit = unit::of(word)?;
-        let axis = quantity::axis_index(expected.machine, stem);
+        let axis = axes::axis_index(expected.machine, stem);
         let of_axis = axis.map(|axis| match expected.machine.axes[axis].kind {
             AxisKind::Linear => (Meaning::Axis(axis), Dimension::Length),
             AxisKind::Rotary => (Meaning::Axis(axis), Dimension::Angle),
         });
         let of_reading = || {
-            let column = columns.iter().find(|column| !column.unit.is_empty() && column.stem == stem)?;
+            let column = columns.iter().find(|column| column.unit != Unit::One && column.stem == stem)?;
             Some((reading(column), if column.is_angle() { Dimension::Angle } else { Dimension::Length }))
         };
         let other = || match stem {

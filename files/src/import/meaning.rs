@@ -5,10 +5,11 @@ use abbe_model::calendar::{DateOrder, clock};
 use abbe_model::driver::column as driver;
 use abbe_model::instrument::column::{Column, Quantity};
 use abbe_model::instrument::{Fault, InstrumentKind};
+use abbe_model::unit::{Dimension, Unit};
 
 use super::Expected;
 use super::grid::{Grid, number_with_unit};
-use super::unit::{self, Dimension, Unit};
+use super::unit;
 use super::words::{self, AxisWord, Direction};
 use crate::spelling::most_similar;
 use crate::table::columns::listed;
@@ -227,7 +228,7 @@ fn meaning(
         return Some(Meaning::Run);
     }
     for column in expected.station.columns() {
-        let fits = match (column.unit.is_empty(), column.is_angle()) {
+        let fits = match (column.unit == Unit::One, column.is_angle()) {
             (true, _) => unit.is_none() || is_of(Dimension::Number),
             (false, true) => is_angle,
             (false, false) => is_length,

@@ -1,21 +1,22 @@
 //! How a session reads a foreign table: as it is, or as a table with our columns where it cannot state the layout.
 
 use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_2;
 
 use abbe_model::document::layout::{Columns, ForeignColumn, Format};
 use abbe_model::document::node::Named;
 use abbe_model::document::value::Count;
 use abbe_model::driver::column as driver;
 use abbe_model::instrument::Fault;
+use abbe_model::unit::Unit;
 
 use super::grid::{Grid, number};
 use super::meaning::{ColumnFound, Found, Meaning};
 use super::open_units::{self, Choice, open};
-use super::unit::Unit;
 use super::values::Values;
 use super::words::Direction;
 use super::{Expected, Reading, Source};
-use crate::quantity;
+use crate::axes;
 
 /// The ways to read a table, the most probable first. `name` is that of the file, for the head of a copy.
 ///
@@ -51,9 +52,8 @@ fn reading(
     let scale_mm = chosen.iter().map(|choice| choice.scale_mm).product();
     let chosen: BTreeMap<usize, Unit> = chosen.iter().flat_map(|choice| choice.units.clone()).collect();
     let unit = |one: &Found| {
-        let stated = one.unit.filter(|unit| !unit.is_ambiguous() && !matches!(one.meaning, Meaning::Driver(_)));
-        let unit = stated.or(chosen.get(&one.column).copied()).unwrap_or(Unit::of_own("1"));
-        if one.is_from_zenith { unit.above_horizon() } else { unit }
+        let stated = one.unit.filter(|unit| *unit != Unit::Grad && !matches!(one.meaning, Meaning::Driver(_)));
+        stated.or(chosen.get(&one.column).copied()).unwrap_or(Unit::One)
     };
     let columns: Vec<ColumnFound> = (0..grid.width())
         .map(|column| {
@@ -76,7 +76,7 @@ fn reading(
         match one.meaning {
             Meaning::Polar => Some(format!("`{theirs}` is a polar angle in place of positions")),
             Meaning::Clock => Some(format!("`{theirs}` is a time of day")),
-            _ if !unit(one).is_own() => Some(format!("`{theirs}` has a unit that is converted")),
+            _ if is_converted(one, unit(one)) => Some(format!("`{theirs}` has a unit that is converted")),
             _ => None,
         }
     }));
@@ -101,19 +101,31 @@ fn reading(
 /// Our name of a column, with its unit.
 fn own_name(one: &Found, unit: Unit, expected: &Expected<'_>) -> String {
     match &one.meaning {
-        Meaning::Axis(axis) => axis_name(*axis, unit.own, expected),
+        Meaning::Axis(axis) => axis_name(*axis, unit.in_files(), expected),
         Meaning::Socket | Meaning::Run | Meaning::Temperature | Meaning::Driver(_) => one.meaning.stem().to_string(),
         Meaning::Time | Meaning::Clock => "time_s".into(),
         meaning if open_units::has_no_unit(meaning, expected) => meaning.stem().to_string(),
-        meaning => format!("{}_{}", meaning.stem(), unit.own),
+        meaning => format!("{}_{}", meaning.stem(), unit.in_files().key()),
     }
 }
 
-fn axis_name(axis: usize, unit: &str, expected: &Expected<'_>) -> String {
+fn axis_name(axis: usize, unit: Unit, expected: &Expected<'_>) -> String {
     let name = &expected.machine.axes[axis].name;
     let lower = name.to_lowercase();
-    let own = if quantity::axis_index(expected.machine, &lower) == Some(axis) { &lower } else { name };
-    format!("{own}_{unit}")
+    let own = if axes::axis_index(expected.machine, &lower) == Some(axis) { &lower } else { name };
+    format!("{own}_{}", unit.key())
+}
+
+/// Whether the values of a column are written in another unit or from another zero.
+fn is_converted(one: &Found, unit: Unit) -> bool {
+    one.is_from_zenith || unit.in_files() != unit
+}
+
+/// A value of a column as it is written. An angle from the zenith is written as an elevation.
+fn converted(one: &Found, unit: Unit, value: f64) -> f64 {
+    let written = unit.in_files();
+    let value = unit.convert(value, written).unwrap_or(value);
+    if one.is_from_zenith { written.to_display(FRAC_PI_2) - value } else { value }
 }
 
 /// `[format]` and `[columns]` of a table that a reader of tables accepts.
@@ -160,7 +172,7 @@ fn normalised(
     because: &[String],
 ) -> String {
     let directed = found.iter().any(|one| one.direction.is_some());
-    let value = |one: &Found, row: usize| unit(one).converted(values.by_column[&one.column][row]);
+    let value = |one: &Found, row: usize| converted(one, unit(one), values.by_column[&one.column][row]);
     // Of the columns of one meaning, that of a direction.
     let of = |meaning: &Meaning, direction: Option<Direction>| {
         let of_meaning = || found.iter().filter(move |one| one.meaning == *meaning);
@@ -168,8 +180,8 @@ fn normalised(
         own.or_else(|| of_meaning().find(|one| one.direction.is_none())).or_else(|| of_meaning().next())
     };
     let in_rad = |one: &Found, row: usize| {
-        let own = unit(one);
-        quantity::Unit::of_column(own.own, true).map_or(f64::NAN, |to| to.to_internal(value(one, row)))
+        let written = unit(one).in_files();
+        if written.is_angle() { written.to_internal(value(one, row)) } else { f64::NAN }
     };
     let mut written: Vec<Written<'_>> = Vec::new();
     let mut seen: Vec<&Meaning> = Vec::new();
@@ -188,7 +200,7 @@ fn normalised(
                     let cell = move |row: usize, _: Option<Direction>| {
                         decimal(circle.centre_mm[place] + circle.amplitude_mm[place] * part(in_rad(one, row)))
                     };
-                    written.push(Written { name: axis_name(axis, "mm", expected), cell: Box::new(cell) });
+                    written.push(Written { name: axis_name(axis, Unit::Millimetre, expected), cell: Box::new(cell) });
                 }
             }
             meaning => {
@@ -196,7 +208,7 @@ fn normalised(
                     let Some(one) = of(meaning, direction) else { return String::new() };
                     let text = &grid.rows[values.rows[row]].cells[one.column];
                     let Some(numbers) = values.by_column.get(&one.column) else { return quoted(text) };
-                    match unit(one).is_own() && *meaning != Meaning::Clock {
+                    match !is_converted(one, unit(one)) && *meaning != Meaning::Clock {
                         _ if numbers[row].is_nan() => String::new(),
                         true if grid.decimal == '.' && number(text, '.').is_some() && text.is_ascii() => text.clone(),
                         _ => decimal(value(one, row)),

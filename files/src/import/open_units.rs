@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::instrument::Fault;
+use abbe_model::unit::Unit;
 use abbe_model::words::{listed, number};
 
 use super::Expected;
 use super::grid::Grid;
 use super::meaning::{Found, Meaning};
-use super::unit::{self, Unit};
+use super::unit;
 use super::values::Values;
 
 /// Positions of a rotary axis beyond this, in radians, are degrees: more than one turn either way.
@@ -22,6 +23,8 @@ const MAX_M: f64 = 20.0;
 /// least this, µm, in µm.
 const MAX_DEVIATION_MM: f64 = 5.0;
 const MIN_DEVIATION_UM: f64 = 0.05;
+/// Units of a length near the reference, the most probable first.
+const LENGTHS: [Unit; 4] = [Unit::Millimetre, Unit::Micrometre, Unit::Metre, Unit::Inch];
 /// Factor by which the range of positions may differ from the planned one: less than that between two units.
 const NEAR_PLAN: f64 = 5.0;
 /// Share of its travel by which an axis may exceed it: a reading behind the end of a drawing is no other unit.
@@ -45,7 +48,7 @@ pub(super) struct Choice {
 pub(super) fn has_no_unit(meaning: &Meaning, expected: &Expected<'_>) -> bool {
     match meaning {
         Meaning::Reading(stem, _) => {
-            expected.station.columns().iter().any(|column| column.stem == *stem && column.unit.is_empty())
+            expected.station.columns().iter().any(|column| column.stem == *stem && column.unit == Unit::One)
         }
         Meaning::Socket | Meaning::Run | Meaning::Clock | Meaning::Driver(_) => true,
         _ => false,
@@ -66,25 +69,24 @@ pub(super) fn open(
 ) -> Result<Vec<Vec<Choice>>, Fault> {
     let columns = Open { grid, found, expected, values };
     let mut open = vec![columns.lengths()?, columns.angles()];
-    let is_of = |unit: &'static str| move |meaning: &Meaning| unit_of_reading(meaning, expected) == Some(unit);
+    let is_of = |unit: Unit| move |meaning: &Meaning| unit_of_reading(meaning, expected) == Some(unit);
     // Small rotations are in our unit.
     for (own, columns) in [
-        ("arcsec", columns.without(&is_of("arcsec"))),
-        ("s", columns.without(&|meaning| *meaning == Meaning::Time)),
-        ("c", columns.without(&|meaning| *meaning == Meaning::Temperature)),
+        (Unit::Arcsecond, columns.without(&is_of(Unit::Arcsecond))),
+        (Unit::Second, columns.without(&|meaning| *meaning == Meaning::Time)),
+        (Unit::Celsius, columns.without(&|meaning| *meaning == Meaning::Temperature)),
     ] {
         let unit = match own {
-            "s" if values.median(columns.first().copied().unwrap_or(0)) > MAX_TIME_S => "ms",
-            "c" if values.largest(&columns) > MIN_KELVIN => "k",
+            Unit::Second if values.median(columns.first().copied().unwrap_or(0)) > MAX_TIME_S => Unit::Millisecond,
+            Unit::Celsius if values.largest(&columns) > MIN_KELVIN => Unit::Kelvin,
             own => own,
         };
         open.push(choice(grid, &[(&columns, unit)]).into_iter().collect());
     }
-    let ambiguous: Vec<usize> =
-        found.iter().filter(|one| one.unit.is_some_and(Unit::is_ambiguous)).map(|one| one.column).collect();
+    let ambiguous: Vec<usize> = found.iter().filter(|one| one.unit == Some(Unit::Grad)).map(|one| one.column).collect();
     if !ambiguous.is_empty() {
-        let of_unit = |(word, unit): (&str, Unit)| Choice {
-            text: format!("`grad` of {} may be a degree or a gon: {word} is read", named(grid, &ambiguous)),
+        let of_unit = |unit: Unit| Choice {
+            text: format!("`grad` of {} may be a degree or a gon: {unit} is read", named(grid, &ambiguous)),
             units: ambiguous.iter().map(|column| (*column, unit)).collect(),
             scale_mm: 1.0,
         };
@@ -111,8 +113,8 @@ impl Open<'_> {
     }
 
     /// The one unit that the columns of these meanings state.
-    fn stated(&self, of: &dyn Fn(&Meaning) -> bool) -> Option<&'static str> {
-        let mut stated = self.found.iter().filter(|one| of(&one.meaning)).filter_map(|one| Some(one.unit?.word()));
+    fn stated(&self, of: &dyn Fn(&Meaning) -> bool) -> Option<Unit> {
+        let mut stated = self.found.iter().filter(|one| of(&one.meaning)).filter_map(|one| one.unit);
         let first = stated.next()?;
         stated.all(|other| other == first).then_some(first)
     }
@@ -128,15 +130,15 @@ impl Open<'_> {
 
     /// Of these units, those in which the positions are those that the test plans, or that the travel allows; all if there
     /// are none.
-    fn possible(&self, columns: &[usize], units: &[&'static str]) -> Vec<&'static str> {
+    fn possible(&self, columns: &[usize], units: &[Unit]) -> Vec<Unit> {
         let axis = |column: &usize| match self.found.iter().find(|one| one.column == *column)?.meaning {
             Meaning::Axis(axis) => Some((axis, self.values.range(*column)?)),
             _ => None,
         };
         let moves: Vec<(usize, [f64; 2])> = columns.iter().filter_map(axis).collect();
-        let is_possible = |unit: &&&'static str| {
+        let is_possible = |unit: &&Unit| {
             moves.iter().all(|(axis, range)| {
-                let [low, high] = range.map(|value| unit_of(unit).to_internal(value));
+                let [low, high] = range.map(|value| unit.to_internal(value));
                 let is_near = |found: f64, planned: f64| {
                     let ratio = found / planned;
                     !ratio.is_finite() || ratio == 0.0 || (1.0 / NEAR_PLAN..NEAR_PLAN).contains(&ratio)
@@ -152,40 +154,40 @@ impl Open<'_> {
                 }
             })
         };
-        let possible: Vec<&str> = units.iter().filter(is_possible).copied().collect();
+        let possible: Vec<Unit> = units.iter().filter(is_possible).copied().collect();
         if possible.is_empty() { units.to_vec() } else { possible }
     }
 
     /// Positions and readings that are lengths, and deviations, which are often in µm beside them.
     fn lengths(&self) -> Result<Vec<Choice>, Fault> {
         let expected = self.expected;
-        let is_deviation = |meaning: &Meaning| unit_of_reading(meaning, expected) == Some("um");
-        let is_length = |meaning: &Meaning| unit_of_reading(meaning, expected) == Some("mm");
+        let is_deviation = |meaning: &Meaning| unit_of_reading(meaning, expected) == Some(Unit::Micrometre);
+        let is_length = |meaning: &Meaning| unit_of_reading(meaning, expected) == Some(Unit::Millimetre);
         let linear = self.without(&self.is_axis(AxisKind::Linear));
         let lengths = self.without(&is_length);
         let deviations = self.without(&is_deviation);
         let stated = self
             .stated(&|meaning| self.is_axis(AxisKind::Linear)(meaning) || is_length(meaning))
-            .filter(|unit| *unit != "um");
+            .filter(|unit| *unit != Unit::Micrometre);
         let both: Vec<usize> = linear.iter().chain(&lengths).copied().collect();
-        let units: &[&str] = match (self.values.largest(&both) < MAX_M, linear.is_empty()) {
-            (true, false) => &["mm", "m", "in"],
-            (true, true) => &["m", "mm", "in"],
-            (false, _) => &["mm", "in"],
+        let units: &[Unit] = match (self.values.largest(&both) < MAX_M, linear.is_empty()) {
+            (true, false) => &[Unit::Millimetre, Unit::Metre, Unit::Inch],
+            (true, true) => &[Unit::Metre, Unit::Millimetre, Unit::Inch],
+            (false, _) => &[Unit::Millimetre, Unit::Inch],
         };
         let reference = expected.station.reference_mm();
-        let near = |unit: &&&str| {
-            let mm = unit_of(unit).to_internal(self.values.median(lengths[0]));
+        let near = |unit: &Unit| {
+            let mm = unit.to_internal(self.values.median(lengths[0]));
             reference > 0.0 && (mm / reference - 1.0).abs() < NEAR_REFERENCE
         };
-        let of_reference = (!lengths.is_empty()).then(|| ["mm", "um", "m", "in"].iter().find(near).copied()).flatten();
+        let of_reference = (!lengths.is_empty()).then(|| LENGTHS.into_iter().find(near)).flatten();
         let mut units = self.possible(&linear, units);
         let known = stated.or(of_reference.filter(|unit| units.contains(unit)));
         if let Some(known) = known.filter(|known| units.contains(known) || linear.is_empty()) {
             units = vec![known];
         }
         if both.is_empty() {
-            units = vec![stated.unwrap_or("mm")];
+            units = vec![stated.unwrap_or(Unit::Millimetre)];
         } else if self.values.largest(&both) == 0.0 {
             units.truncate(1);
         }
@@ -202,13 +204,13 @@ impl Open<'_> {
     }
 
     /// The unit of deviations beside lengths in a unit.
-    fn unit_of_deviations(&self, deviations: &[usize], beside: &'static str) -> Result<&'static str, Fault> {
+    fn unit_of_deviations(&self, deviations: &[usize], beside: Unit) -> Result<Unit, Fault> {
         let [first, ..] = deviations[..] else { return Ok(beside) };
         let rms = self.values.rms(deviations);
-        let mm = unit_of(beside).to_internal(rms);
+        let mm = beside.to_internal(rms);
         match (mm <= MAX_DEVIATION_MM, rms >= MIN_DEVIATION_UM) {
             (true, false) => Ok(beside),
-            (false, _) => Ok("um"),
+            (false, _) => Ok(Unit::Micrometre),
             (true, true) => {
                 let what = format!(
                     "the unit of {} is not stated, and deviations of {} rms may be in {beside} or in µm",
@@ -227,16 +229,16 @@ impl Open<'_> {
 
     /// Positions of rotary axes and directions.
     fn angles(&self) -> Vec<Choice> {
-        let is_direction = |meaning: &Meaning| unit_of_reading(meaning, self.expected) == Some("deg");
+        let is_direction = |meaning: &Meaning| unit_of_reading(meaning, self.expected) == Some(Unit::Degree);
         let rotary = self.without(&self.is_axis(AxisKind::Rotary));
         let directions = self.without(&is_direction);
         let both: Vec<usize> = rotary.iter().chain(&directions).copied().collect();
         let axes = &self.expected.machine.axes;
         let is_arm = axes.iter().filter(|axis| axis.kind == AxisKind::Rotary).count() > 2;
-        let units: &[&str] = match (self.values.largest(&both) <= MAX_TURN_RAD, is_arm || rotary.is_empty()) {
-            (false, _) => &["deg"],
-            (true, true) => &["rad", "deg"],
-            (true, false) => &["deg", "rad"],
+        let units: &[Unit] = match (self.values.largest(&both) <= MAX_TURN_RAD, is_arm || rotary.is_empty()) {
+            (false, _) => &[Unit::Degree],
+            (true, true) => &[Unit::Radian, Unit::Degree],
+            (true, false) => &[Unit::Degree, Unit::Radian],
         };
         let mut units = self.possible(&rotary, units);
         // A direction beside positions in another unit is one that a fit decides.
@@ -254,25 +256,25 @@ impl Open<'_> {
 }
 
 /// The unit in which messages name the readings of a column; `None` for a column of another kind.
-fn unit_of_reading(meaning: &Meaning, expected: &Expected<'_>) -> Option<&'static str> {
+fn unit_of_reading(meaning: &Meaning, expected: &Expected<'_>) -> Option<Unit> {
     let Meaning::Reading(stem, _) = meaning else { return None };
     expected.station.columns().iter().find(|column| column.stem == *stem).map(|column| column.unit)
 }
 
 /// Groups of columns, each in a unit; `None` if they have no columns.
-fn choice(grid: &Grid, groups: &[(&Vec<usize>, &'static str)]) -> Option<Choice> {
-    let mut by_unit: Vec<(&str, Vec<usize>)> = Vec::new();
+fn choice(grid: &Grid, groups: &[(&Vec<usize>, Unit)]) -> Option<Choice> {
+    let mut by_unit: Vec<(Unit, Vec<usize>)> = Vec::new();
     for (columns, unit) in groups.iter().filter(|(columns, _)| !columns.is_empty()) {
         match by_unit.iter_mut().find(|(own, _)| own == unit) {
             Some((_, all)) => all.extend(columns.iter()),
-            None => by_unit.push((unit, columns.to_vec())),
+            None => by_unit.push((*unit, columns.to_vec())),
         }
     }
     let texts = by_unit
         .iter()
-        .map(|(unit, columns)| format!("the unit of {} is not stated: {unit} is read", named(grid, columns)));
-    let units = by_unit.iter().flat_map(|(own, columns)| columns.iter().map(move |column| (*column, unit_of(own))));
-    let first = by_unit.first().map(|(unit, _)| unit_of(unit))?;
+        .map(|(unit, columns)| format!("the unit of {} is not stated: {} is read", named(grid, columns), unit.key()));
+    let units = by_unit.iter().flat_map(|(own, columns)| columns.iter().map(move |column| (*column, *own)));
+    let first = by_unit.first().map(|(unit, _)| *unit)?;
     let scale_mm = if first.is_length() { first.to_internal(1.0) } else { 1.0 };
     Some(Choice { text: texts.collect::<Vec<_>>().join("; "), units: units.collect(), scale_mm })
 }
@@ -280,9 +282,4 @@ fn choice(grid: &Grid, groups: &[(&Vec<usize>, &'static str)]) -> Option<Choice>
 fn named(grid: &Grid, columns: &[usize]) -> String {
     let names: Vec<String> = columns.iter().map(|column| format!("`{}`", grid.name(*column))).collect();
     listed(&names, "and")
-}
-
-/// A unit of these lists.
-fn unit_of(word: &str) -> Unit {
-    unit::of(word).unwrap_or(Unit::of_own("1"))
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use abbe_model::calendar::{DAY_S, DateOrder, Moment, clock};
 use abbe_model::instrument::Fault;
+use abbe_model::unit::Unit;
 use abbe_model::words::{counted, with_article};
 
 use super::Expected;
@@ -142,14 +143,16 @@ fn number_of(grid: &Grid, one: &Found, line: usize, cell: &str, needs: &mut Need
     needs.units = true;
     match one.unit {
         Some(own) if own == unit => Ok(Some(value)),
-        Some(own) if own.agrees_with(unit) => {
-            needs.mixed_units = true;
-            Ok(Some(own.of_internal(unit.to_internal(value))))
-        }
-        Some(own) => {
-            let what = with_article(&unit.dimension().to_string());
-            fault(format!("is {what}, and the column is in {}", own.word()))
-        }
+        Some(own) => match unit.convert(value, own).filter(|_| ![own, unit].contains(&Unit::Grad)) {
+            Some(value) => {
+                needs.mixed_units = true;
+                Ok(Some(value))
+            }
+            None => {
+                let what = with_article(&unit.dimension().to_string());
+                fault(format!("is {what}, and the column is in {}", own.key()))
+            }
+        },
         None => fault("has a unit, and the column holds numbers without one".into()),
     }
 }

@@ -10,7 +10,7 @@ use abbe_model::document::{machine as document, session};
 
 use crate::access::{self, ReadOptions};
 use crate::source_map::BodyFile;
-use crate::{quantity, stl};
+use crate::{axes, stl};
 
 /// The files of bodies: where they may lie, and which were read.
 #[derive(Default)]
@@ -76,7 +76,7 @@ fn body(
         return Err(Fault::new(format!("two bodies are called `{name}`"), help).at("name"));
     }
     let axis = document.axis.as_ref().map(|text| {
-        quantity::axis(machine, text).map_err(|(message, help)| {
+        axes::axis(machine, text).map_err(|(message, help)| {
             Fault::new(message, format!("{help}; a body of the bed has no `axis`")).at("axis")
         })
     });

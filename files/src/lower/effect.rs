@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use abbe_model::component::ErrorKind;
-use abbe_model::document::effect::{self as document, SCALES, internal};
+use abbe_model::document::effect::{self as document, SCALES};
 use abbe_model::document::fault::{Fault, Help, Within};
 use abbe_model::document::schema;
 use abbe_model::document::value::Positive;
@@ -16,7 +16,7 @@ use abbe_model::session::limits::MIN_UM;
 use abbe_model::words::{self, listed, with_article};
 
 use super::{Context, Declared};
-use crate::quantity;
+use crate::axes;
 use crate::spelling::known_names;
 
 /// The effect with its aliases; `columns` are the driver columns of the data, `NAME_unit`.
@@ -136,7 +136,7 @@ fn component(context: &Context<'_>, text: &str) -> Result<Component, Fault> {
     };
     match Component::parse(text) {
         Some(Component::Axis(mut name)) => {
-            let index = quantity::axis(context.machine, &name.axis)
+            let index = axes::axis(context.machine, &name.axis)
                 .map_err(|(message, help)| Fault::new(format!("effect on \"{text}\": {message}"), help))?;
             name.axis.clone_from(&context.machine.axes[index].name);
             Ok(Component::Axis(name))
@@ -181,14 +181,14 @@ fn driver(
             }
         };
     };
-    let axis = quantity::axis_index(context.machine, text);
+    let axis = axes::axis_index(context.machine, text);
     // A column may be named without its unit if no other column has its name.
     let of_quantity: Vec<&String> = columns.iter().filter(|name| column::quantity(name) == text).collect();
     let driver = match (Driver::parse(text), axis, &of_quantity[..]) {
         (Driver::Axis(_) | Driver::Column(_), Some(index), _) => Driver::Axis(context.machine.axes[index].name.clone()),
         (Driver::Axis(_), None, [name]) => Driver::Column((*name).clone()),
         (Driver::Axis(_), None, _) => {
-            let (message, help) = quantity::no_axis(context.machine, text);
+            let (message, help) = axes::no_axis(context.machine, text);
             let columns = columns.iter().map(String::as_str);
             let others: Vec<&str> = Driver::words().into_iter().chain(columns).collect();
             let help = format!("{help}; other drivers are {}, and columns as NAME_unit", listed(&others, "and"));
@@ -206,8 +206,8 @@ fn driver(
 /// The driver of a weight at an axis, which the axis of the component has to carry.
 fn weight_at(context: &Context<'_>, component: &Component, text: &str, name: &str) -> Result<Driver, Fault> {
     let machine = context.machine;
-    let Some(loaded) = quantity::axis_index(machine, name) else {
-        let (message, help) = quantity::no_axis(machine, name);
+    let Some(loaded) = axes::axis_index(machine, name) else {
+        let (message, help) = axes::no_axis(machine, name);
         return Err(Fault::new(format!("effect driven by \"{text}\": {message}"), help).at("driver"));
     };
     match component.axis(machine) {
@@ -265,7 +265,7 @@ fn prior(
                 Fault::is(format!("{}; it must be between {MIN_UM} and {MAX_SCALE}", words::number(scale))).at(key)
             );
         }
-        prior = CoefficientPrior::Scale(scale * internal(unit));
+        prior = CoefficientPrior::Scale(unit.displayed().to_internal(scale));
         stated = true;
     }
     if let Some(name) = &document.family {

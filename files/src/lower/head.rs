@@ -11,12 +11,12 @@ use abbe_model::document::session as document;
 use abbe_model::document::value::{NotNegative, Note};
 use abbe_model::instrument::{InstrumentKind, SharedBy};
 use abbe_model::pattern;
-use abbe_model::quantity::{ARCSECOND, MICROMETRE};
 use abbe_model::session::expression::Constant;
 use abbe_model::session::{SocketDistance, Test, limits};
+use abbe_model::unit::{MM_PER_UM, RAD_PER_ARCSEC};
 use abbe_model::words::with_article;
 
-use crate::quantity;
+use crate::axes;
 
 /// Notes that reports repeat.
 pub(super) fn about(notes: &Named<Note>) -> Result<Vec<(String, String)>, Fault> {
@@ -69,11 +69,12 @@ pub(super) struct Instrument {
 pub(super) fn instrument(document: &document::Instrument) -> Result<Instrument, Fault> {
     let Kind(kind) = document.kind;
     let in_mm = |um: Option<NotNegative>, key: &str| {
-        let mm = um.map(|NotNegative(um)| limits::too_small_um(um).map_or(Ok(um * MICROMETRE), Err));
+        let mm = um.map(|NotNegative(um)| limits::too_small_um(um).map_or(Ok(um * MM_PER_UM), Err));
         mm.transpose().within(key)
     };
     let in_rad = |arcsec: Option<NotNegative>, key: &str| {
-        let rad = arcsec.map(|NotNegative(arcsec)| limits::too_small_um(arcsec).map_or(Ok(arcsec * ARCSECOND), Err));
+        let rad =
+            arcsec.map(|NotNegative(arcsec)| limits::too_small_um(arcsec).map_or(Ok(arcsec * RAD_PER_ARCSEC), Err));
         rad.transpose().within(key)
     };
     Ok(Instrument {
@@ -139,7 +140,7 @@ fn error_name(machine: &Machine, text: &str) -> Result<ErrorName, Fault> {
         let help = "ISO 230-1 names such as \"EY0A\" (location) and \"EYA\" (motion), or `e_y0a`, `θ_z0c`";
         return Err(Fault::new(format!("\"{text}\" is not the name of an error"), help));
     };
-    let index = quantity::axis(machine, &name.axis)
+    let index = axes::axis(machine, &name.axis)
         .map_err(|(message, help)| Fault::new(format!("\"{text}\": {message}"), help))?;
     name.axis.clone_from(&machine.axes[index].name);
     Ok(name)
@@ -175,7 +176,7 @@ pub(super) fn socket_distances(
             return Err(Fault::of_key("needs two different sockets", None).at("between"));
         }
         let u_um = document.u_um.unwrap_or_default().0;
-        Ok(SocketDistance { between, distance_mm: document.mm.0, u_mm: u_um * MICROMETRE })
+        Ok(SocketDistance { between, distance_mm: document.mm.0, u_mm: u_um * MM_PER_UM })
     };
     documents.iter().enumerate().map(|(item, document)| distance(document).within_item(item)).collect()
 }

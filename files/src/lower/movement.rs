@@ -11,7 +11,7 @@ use abbe_model::session::limits;
 use abbe_model::session::motion::{FollowOffset, MAX_READINGS, Motion, length_of, programmed_over_path_feed};
 
 use super::Context;
-use crate::quantity;
+use crate::axes;
 
 /// Default feed of a linear axis or a circle, mm/s: 1000 mm/min.
 const DEFAULT_FEED_MM_S: f64 = 1000.0 / 60.0;
@@ -73,7 +73,7 @@ fn circle(context: &Context<'_>, document: &document::Circle) -> Result<Motion, 
         return Err(Fault::unexpected("two linear axes, such as \"XY\",").at("plane"));
     };
     let linear = |name: &str| -> Result<usize, Fault> {
-        let axis = quantity::axis(context.machine, name)?;
+        let axis = axes::axis(context.machine, name)?;
         if context.machine.axes[axis].kind != AxisKind::Linear {
             return Err(Fault::new(format!("axis `{name}` is rotary; a circle moves two linear axes"), None));
         }
@@ -102,7 +102,7 @@ fn line(context: &Context<'_>, document: &document::Line) -> Result<Motion, Faul
     let positions = |named: &Named<Length>| {
         let mut found: Vec<(usize, f64)> = Vec::with_capacity(named.0.len());
         for (key, length) in &named.0 {
-            let linear = quantity::axis_position(machine, key)
+            let linear = axes::axis_position(machine, key)
                 .filter(|(axis, _)| machine.axes[*axis].kind == AxisKind::Linear)
                 .ok_or_else(|| {
                     let linear = machine.axes.iter().filter(|axis| axis.kind == AxisKind::Linear);
@@ -190,7 +190,7 @@ fn follow(context: &Context<'_>, document: &document::Follow, station: &Station<
 }
 
 fn moved_axis(context: &Context<'_>, name: &str) -> Result<(usize, AxisKind), Fault> {
-    let axis = quantity::axis(context.machine, name).within("axis")?;
+    let axis = axes::axis(context.machine, name).within("axis")?;
     Ok((axis, context.machine.axes[axis].kind))
 }
 

@@ -15,13 +15,14 @@ use abbe_model::session::contributors::Contributors;
 use abbe_model::session::expression::Length;
 use abbe_model::session::motion::Motion;
 use abbe_model::session::{Test, planned};
+use abbe_model::unit::Unit;
 use abbe_model::words::with_article;
 
 use super::Data;
 use super::{Context, Found, layout, movement};
 use crate::access;
+use crate::axes;
 use crate::check;
-use crate::quantity;
 use crate::table::fill::Filling;
 use crate::table::{self, memory, request::Request};
 
@@ -162,7 +163,7 @@ fn at(context: &Context<'_>, entries: &Named<value::Length>) -> Result<HeldPosit
     let axes = machine.axes.len();
     let mut held = HeldPositions { at: vec![0.0; axes], written: vec![None; axes], listed: vec![false; axes] };
     for (key, length) in &entries.0 {
-        let Some((axis, unit)) = quantity::axis_position(machine, key) else {
+        let Some((axis, unit)) = axes::axis_position(machine, key) else {
             let known: Vec<String> = machine.axes.iter().map(|axis| axis.column("")).collect();
             let help = format!("known: {}", known.join(", "));
             return Err(Fault::new(format!("`at` has the unknown position `{key}`"), help).on_key().at(key));
@@ -173,7 +174,7 @@ fn at(context: &Context<'_>, entries: &Named<value::Length>) -> Result<HeldPosit
         }
         let (written, number) = length.evaluated(key, context.constants).within(key)?;
         held.at[axis] = unit.to_internal(number);
-        let in_mm = machine.axes[axis].kind == AxisKind::Linear && unit == quantity::Unit::Times(1.0);
+        let in_mm = machine.axes[axis].kind == AxisKind::Linear && unit == Unit::Millimetre;
         held.written[axis] = in_mm.then_some(written);
         held.listed[axis] = true;
     }

@@ -10,7 +10,7 @@ use abbe_model::document::value::Positive;
 use abbe_model::session::limits;
 use abbe_model::session::tolerance::{Limit, TestFigure, Tolerance, Toleranced};
 
-use crate::quantity;
+use crate::axes;
 use crate::spelling::known_names;
 
 /// The suffixes of limits of parameters, with their units. A slope of 1 µm/m is an angle of 1 µrad.
@@ -70,7 +70,7 @@ fn of_parameter(machine: &Machine, unknowns: &[ErrorName], key: &str, node: &Nod
             let help = "an error such as EX0C or EZC, or a parameter of an effect such as \"EZC~C:h2.amplitude_um\"";
             fault(format!("`{id}` of [tolerance.errors] is not the name of an error"), help)
         })?;
-        if let Some(index) = quantity::axis_index(machine, &name.axis) {
+        if let Some(index) = axes::axis_index(machine, &name.axis) {
             name.axis.clone_from(&machine.axes[index].name);
         }
         if !unknowns.contains(&name) {

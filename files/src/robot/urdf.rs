@@ -9,6 +9,7 @@ use std::path::Path;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::error::{Location, ModelError};
+use abbe_model::unit::Unit;
 use abbe_model::words::{first_of, number};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use quick_xml::Reader;
@@ -18,8 +19,6 @@ use super::chain::{Chain, Joint};
 use crate::source::Source;
 use crate::spelling::suggestion;
 
-/// Millimetres per metre.
-const MM: f64 = 1e3;
 /// Largest length in a file, m: a kilometre.
 const MAX_M: f64 = 1e3;
 /// Number of links that a message names.
@@ -244,7 +243,7 @@ fn three(text: &str) -> Result<[f64; 3], String> {
 fn pose(xyz: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Isometry3<f64> {
     let turn = |axis: Vector3<f64>, angle: f64| UnitQuaternion::from_scaled_axis(axis * angle);
     let rotation = turn(Vector3::z(), yaw) * turn(Vector3::y(), pitch) * turn(Vector3::x(), roll);
-    Isometry3::from_parts(Translation3::from(Vector3::from(xyz) * MM), rotation)
+    Isometry3::from_parts(Translation3::from(Vector3::from(xyz) * Unit::Metre.internal()), rotation)
 }
 
 impl Urdf {
@@ -409,7 +408,7 @@ impl Urdf {
                 Kind::Rotary => AxisKind::Rotary,
                 Kind::Fixed | Kind::Other => continue,
             };
-            let scale = if kind == AxisKind::Linear { MM } else { 1.0 };
+            let scale = if kind == AxisKind::Linear { Unit::Metre.internal() } else { 1.0 };
             let is_endless = joint.word == "continuous";
             let travel = joint
                 .limits

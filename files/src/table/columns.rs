@@ -10,12 +10,13 @@ use abbe_model::error::{Location, ModelError};
 use abbe_model::instrument::Fault;
 use abbe_model::instrument::Station;
 use abbe_model::instrument::column::Quantity;
+use abbe_model::unit::Unit;
 
 use super::encoding::name_of;
 use super::number::number;
 use super::request::{ColumnMapping, ForeignColumn, Request};
 use super::row::Row;
-use crate::quantity::{self, Unit};
+use crate::axes;
 use crate::spelling::suggestion;
 
 /// The content of a column.
@@ -56,29 +57,29 @@ impl Role {
         }
         match column::of_files(name) {
             Some(own) => Some(Role::Driver(own.to_string())),
-            None => quantity::axis_position(machine, name).map(|(axis, unit)| Role::Axis(axis, unit)),
+            None => axes::axis_position(machine, name).map(|(axis, unit)| Role::Axis(axis, unit)),
         }
     }
 
     /// Parses one of our names.
     pub fn of(name: &str, request: &Request<'_>) -> Option<Role> {
         let own = request.test.station.columns();
-        if let Some(column) = own.iter().find(|column| column.unit.is_empty() && column.stem == name) {
+        if let Some(column) = own.iter().find(|column| column.unit == Unit::One && column.stem == name) {
             return Some(match column.quantity {
                 Quantity::Socket => Role::Socket,
-                quantity => Role::Reading(quantity, Unit::Times(1.0)),
+                quantity => Role::Reading(quantity, Unit::One),
             });
         }
         match name {
-            "polar_deg" => return Some(Role::Polar(Unit::Degrees)),
-            "polar_rad" => return Some(Role::Polar(Unit::Times(1.0))),
+            "polar_deg" => return Some(Role::Polar(Unit::Degree)),
+            "polar_rad" => return Some(Role::Polar(Unit::Radian)),
             _ => {}
         }
         if let Some(role) = Role::of_machine(name, request.machine) {
             return Some(role);
         }
         let (what, unit) = name.rsplit_once('_')?;
-        let column = own.iter().find(|column| !column.unit.is_empty() && column.stem == what)?;
+        let column = own.iter().find(|column| column.unit != Unit::One && column.stem == what)?;
         Some(Role::Reading(column.quantity, Unit::of_column(unit, column.is_angle())?))
     }
 

@@ -11,13 +11,13 @@ use abbe_model::error::ModelError;
 use abbe_model::instrument::Station;
 use abbe_model::instrument::column::{Column, Quantity};
 use abbe_model::session::readings::Readings;
+use abbe_model::unit::Unit;
 
 use super::comment::is_comment;
 use super::format::{Content, DataFormat, Rows, Table};
 use super::lines::Lines;
 use super::request::Request;
 use super::row::Row;
-use crate::quantity::Unit;
 use crate::store::Store;
 
 /// The format. It reads every file that is of no other format.
@@ -167,8 +167,7 @@ pub fn text(machine: &Machine, station: &Station<f64>, readings: &Readings) -> S
         cells.extend(readings.drivers.values().filter_map(|values| values.get(row)).map(|value| decimal(*value)));
         for (channel, column) in columns.iter().enumerate() {
             let value = readings.observed.get(row * readings.channels + channel).filter(|value| !value.is_nan());
-            let unit = Unit::of_column(unit_of(column), column.is_angle()).unwrap_or(Unit::Times(1.0));
-            cells.push(value.map_or(String::new(), |value| decimal(unit.in_unit(*value))));
+            cells.push(value.map_or(String::new(), |value| decimal(unit_of(column).to_display(*value))));
         }
         text.push_str(&cells.join(","));
         text.push('\n');
@@ -177,8 +176,8 @@ pub fn text(machine: &Machine, station: &Station<f64>, readings: &Readings) -> S
 }
 
 /// The unit in which a column of readings is written.
-fn unit_of(column: &Column) -> &'static str {
-    if column.is_angle() { column.unit } else { "mm" }
+fn unit_of(column: &Column) -> Unit {
+    if column.is_angle() { column.unit } else { Unit::Millimetre }
 }
 
 /// A number with the necessary decimals, at most twelve.

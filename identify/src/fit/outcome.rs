@@ -1,6 +1,5 @@
 //! What a fit is worth: its residual against the noise, what determines its estimates, what it assumes.
 
-use abbe_model::axis::AxisKind;
 use abbe_model::instrument::Checked;
 use abbe_model::session::{Prior, Test};
 use abbe_model::words::counted;
@@ -230,12 +229,8 @@ fn ranges(problem: &Problem) -> Vec<DataRange> {
             (least, greatest) = (least.min(*position), greatest.max(*position));
         }
         if least < greatest {
-            let unit = match axis.kind {
-                AxisKind::Linear => "mm",
-                AxisKind::Rotary => "deg",
-            };
             let range = [least, greatest].map(|position| axis.kind.to_display(position));
-            ranges.push(DataRange { axis: axis.name.clone(), range, unit: unit.to_string() });
+            ranges.push(DataRange { axis: axis.name.clone(), range, unit: axis.kind.unit().to_string() });
         }
     }
     ranges

@@ -4,7 +4,7 @@
 use super::{Fit, StepPosition};
 use crate::parameters::Role;
 use crate::problem::Problem;
-use crate::unit::Unit;
+use crate::unit::ParameterUnit;
 
 /// A reported quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,7 +90,7 @@ pub(crate) fn values_at(
             Quantity::Position(k) => {
                 let StepPosition { effect, step, .. } = fit.positions[k];
                 let effect = &problem.parameters.effects[effect];
-                let unit = Unit::of_number(&problem.session, effect);
+                let unit = ParameterUnit::of_number(&problem.session, effect);
                 accept(effect.shape.positions()[step] * unit.display_per_internal);
             }
             Quantity::Harmonic(j) => {

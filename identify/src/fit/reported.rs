@@ -1,6 +1,7 @@
 //! A fit in the form of its results: display units, words, and the lists of what is not identifiable and of outliers.
 
 use abbe_model::effect::description::meaning;
+use abbe_model::unit::ARCSEC_PER_RAD;
 
 use super::outcome::{self, Determined};
 use super::quantities::{Quantity, quantities, rms_of_waves, slopes_of_rms, u_of_undetermined_phase_deg};
@@ -24,7 +25,7 @@ use crate::results::{
 };
 use crate::straightness;
 use crate::tolerance::conformity;
-use crate::unit::{ARCSEC, Unit};
+use crate::unit::ParameterUnit;
 
 /// The fit in its reported form.
 ///
@@ -125,7 +126,7 @@ fn rms_of_units(
     heldout_mm: Option<f64>,
 ) -> (f64, f64, Option<OfAngles>) {
     let scale = heldout_mm.map_or(1.0, |mm| mm / fit.held_out.rms_mm);
-    let arcsec = |mm: f64| mm / judged.session.lever_mm * ARCSEC;
+    let arcsec = |mm: f64| mm / judged.session.lever_mm * ARCSEC_PER_RAD;
     match [&fit.residuals, &fit.held_out.residuals].map(|residuals| rms_by_unit_mm(judged, residuals)) {
         [[Some(rms), Some(of_angles)], [Some(held), Some(held_of_angles)]] => {
             let of_angles = OfAngles {
@@ -180,7 +181,7 @@ pub(crate) fn parameters_of_noise(problem: &Problem, fit: &Fit) -> Vec<Estimate>
 fn position(problem: &Problem, position: &StepPosition) -> Estimate {
     let StepPosition { effect: number, step, u, interval_95, .. } = *position;
     let effect = &problem.parameters.effects[number];
-    let Unit { name, display_per_internal } = Unit::of_number(&problem.session, effect);
+    let ParameterUnit { name, display_per_internal } = ParameterUnit::of_number(&problem.session, effect);
     let [value, u] = [effect.shape.positions()[step], u].map(|value| value * display_per_internal);
     let id = problem.parameters.position_id(number, step);
     let which = if effect.shape.positions().len() > 1 { format!("position {}", step + 1) } else { "position".into() };

@@ -19,13 +19,13 @@
 //! proportional, whatever the directions of the axes are.
 
 use abbe_model::instrument::{Instrument, InstrumentKind};
+use abbe_model::unit::ARCSEC_PER_RAD;
 use faer::Mat;
 
 use super::Fit;
 use crate::error::IdentifyError;
 use crate::problem::Problem;
 use crate::results::{PointingTerm, PointingTerms};
-use crate::unit::ARCSEC;
 
 /// Highest order of a harmonic term.
 const HIGHEST_ORDER: usize = 8;
@@ -50,7 +50,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<PointingTerms, IdentifyErr
         residuals.iter().enumerate().filter(move |(scalar, _)| problem.counts(test, *scalar)).map(|(_, r)| r * r)
     });
     let stars = problem.readings();
-    let per_mm = ARCSEC / problem.session.lever_mm;
+    let per_mm = ARCSEC_PER_RAD / problem.session.lever_mm;
     let sky_rms = (squares.sum::<f64>() / stars as f64).sqrt();
     let rank = fit.rank.identifiable_basis.ncols();
     // TPOINT's own sigma: the sky rms for the noise, without any enlargement.
@@ -75,7 +75,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<PointingTerms, IdentifyErr
             of.iter().map(|(j, factor)| factor * sizes[*j] * combination[*j]).sum::<f64>().abs() / length
         };
         let has_value = fit.rank.null_combinations.iter().all(|combination| share(combination) < SEPARABLE);
-        let number = |internal: f64| has_value.then_some(internal * ARCSEC);
+        let number = |internal: f64| has_value.then_some(internal * ARCSEC_PER_RAD);
         let u = variance.max(0.0).sqrt();
         found.push(PointingTerm {
             term: name.clone(),

@@ -7,6 +7,7 @@ use abbe_model::document::kind::Kind;
 use abbe_model::document::machine::Machine;
 use abbe_model::document::print;
 use abbe_model::document::value::{Json, Long, Positive};
+use abbe_model::unit::Unit;
 use schemars::JsonSchema;
 use serde::ser::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -14,7 +15,6 @@ use serde_json::{Map, Value};
 
 use crate::noise::NoiseSource;
 use crate::results::ModelFit;
-use crate::unit::ReadingUnit;
 
 /// The word that marks a model file.
 pub const SCHEMA: &str = "abbe-model";
@@ -51,8 +51,9 @@ pub struct Document {
     pub locations: Long<Vec<Location>>,
     /// The unit of the figures of readings, noise and residuals: absent for µm, `arcsec` of a session of angles, whose
     /// figures stand under the same keys.
-    #[serde(default, skip_serializing_if = "ReadingUnit::is_micrometre")]
-    pub reading_unit: ReadingUnit,
+    #[serde(default, skip_serializing_if = "Unit::is_micrometre")]
+    #[schemars(with = "String")]
+    pub reading_unit: Unit,
     /// The noise of a reading.
     pub noise: Noise,
     /// How well the model describes its own readings.

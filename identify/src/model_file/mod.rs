@@ -25,13 +25,13 @@ use abbe_model::driver::Reference;
 use abbe_model::effect::Effect;
 use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::Prior;
+use abbe_model::unit::Unit;
 use faer::Mat;
 
 use crate::noise::Noise;
 use crate::parameters::Role;
 use crate::results::{Goodness, GoodnessVerdict, ModelFit, ParameterChange};
-use crate::unit::ReadingUnit;
-use crate::unit::Unit;
+use crate::unit::ParameterUnit;
 pub use document::{InputFile, MotionRange, Provenance};
 pub use range::DriverRange;
 pub use read::{is_model, of_source, read};
@@ -44,7 +44,7 @@ pub struct ModelParameter {
     /// The kind; a coefficient refers to [`IdentifiedModel::effects`].
     pub role: Role,
     /// Display unit.
-    pub unit: Unit,
+    pub unit: ParameterUnit,
     /// Value in internal units (mm, rad); 0 if it is held.
     pub value: f64,
     /// Whether it is held at nominal, since the readings do not separate it from other parameters.
@@ -86,7 +86,7 @@ pub struct IdentifiedModel {
     /// The noise of a reading.
     pub noise: Noise,
     /// The unit of noise and residuals.
-    pub unit: ReadingUnit,
+    pub unit: Unit,
     /// How well the model describes its own readings.
     pub fit: ModelFit,
     /// The range of every axis and driver.

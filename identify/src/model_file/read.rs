@@ -27,7 +27,7 @@ use crate::error::IdentifyError;
 use crate::noise::Noise;
 use crate::numerics::symmetric::Symmetric;
 use crate::parameters::Role;
-use crate::unit::Unit;
+use crate::unit::ParameterUnit;
 
 /// Least eigenvalue of a covariance over its largest, in scaled parameters, below 0 by rounding.
 const ROUNDING_OF_COVARIANCE: f64 = 1e-9;
@@ -234,7 +234,7 @@ fn parameter(
     Ok(ModelParameter {
         id: entry.id.clone(),
         role,
-        unit: Unit { name: entry.unit.clone(), display_per_internal: entry.display_per_internal.0 },
+        unit: ParameterUnit { name: entry.unit.clone(), display_per_internal: entry.display_per_internal.0 },
         value: entry.internal,
         held: entry.held,
         identifiable: entry.identifiable && !entry.held,

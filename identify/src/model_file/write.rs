@@ -12,8 +12,6 @@ use super::IdentifiedModel;
 use super::document::{self, Document, SCHEMA, SCHEMA_VERSION};
 use crate::error::IdentifyError;
 use crate::parameters::Role;
-use crate::unit::Unit;
-use abbe_model::instrument::InternalUnit;
 
 /// The key of the checksum.
 pub(super) const CHECKSUM: &str = "sha256";
@@ -116,19 +114,18 @@ impl IdentifiedModel {
             driver: range.driver.to_string(),
             axis: range.component_axis.clone(),
             range: range.range.map(|value| unit.to_display(value)),
-            unit: unit.result.to_string(),
+            unit: unit.result().to_string(),
             internal: range.range,
         }
     }
 }
 
 fn location((name, value): &(abbe_model::component::ErrorName, f64)) -> document::Location {
-    let internal = if name.freedom.is_angle() { InternalUnit::Radian } else { InternalUnit::Millimetre };
-    let unit = Unit::of(internal);
+    let unit = name.freedom.unit().displayed();
     document::Location {
         id: name.to_string(),
-        value: value * unit.display_per_internal,
-        unit: unit.name,
+        value: unit.to_display(*value),
+        unit: unit.name().to_string(),
         internal: *value,
     }
 }

@@ -25,7 +25,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::problem::Problem;
-use crate::unit::ReadingUnit;
+use abbe_model::unit::Unit;
 pub(crate) use autocorrelation::enlargement_of_mean;
 pub use autocorrelation::{Autocorrelation, Process, along_runs};
 pub(crate) use stated::silent_channels;
@@ -99,8 +99,9 @@ impl std::fmt::Display for NoiseSource {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ReadingNoise {
     /// The unit of the figures of readings, in which their keys end; absent for µm.
-    #[serde(rename = "reading_unit", default, skip_serializing_if = "ReadingUnit::is_micrometre")]
-    pub unit: ReadingUnit,
+    #[serde(rename = "reading_unit", default, skip_serializing_if = "Unit::is_micrometre")]
+    #[schemars(with = "String")]
+    pub unit: Unit,
     /// Standard deviation of one scalar reading, µm.
     #[serde(rename = "noise_um")]
     pub value: f64,

@@ -25,11 +25,10 @@ pub fn stated_against_repeats(problem: &Problem, residuals: &[Vec<f64>]) -> Opti
     (!by_chance && !(1.0 / DISAGREEMENT_RATIO..=DISAGREEMENT_RATIO).contains(&ratio)).then(|| {
         format!(
             "the session states a noise of {} {symbol}, and the repeatability is {} ({} degrees of freedom): the uncertainties of a fit follow from \
-             the stated noise; correct `{}`, or omit it",
+             the stated noise; correct `noise_{unit}`, or omit it",
             stated_mm * 1e3,
             unit.text(sigma_mm * 1e3, 3),
             pure.freedom,
-            unit.noise_key()
         )
     })
 }

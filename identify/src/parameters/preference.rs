@@ -67,17 +67,16 @@ pub fn natural(id: &str) -> Vec<(u64, String)> {
 
 #[cfg(test)]
 mod tests {
-    use abbe_model::instrument::InternalUnit;
     use abbe_model::session::Prior;
+    use abbe_model::unit::InternalUnit;
 
     use super::*;
-    use crate::unit::Unit;
 
     #[test]
     fn pivots_are_preferred_by_kind_and_name_and_not_by_declaration() {
         let parameter = |id: &str, role: Role| Parameter {
             id: id.to_string(),
-            unit: Unit::of(InternalUnit::Millimetre),
+            unit: InternalUnit::Millimetre.displayed().into(),
             size: 1.0,
             prior: Prior::Free,
             role,

@@ -31,7 +31,7 @@ pub fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
              its period, centre or width, or remove it",
             problem.parameters.effects[effect].id(),
             fit.beta[j].abs() * parameter.unit.display_per_internal,
-            super::symbol(&parameter.unit.name),
+            parameter.unit.symbol(),
         ));
     }
     warnings

@@ -15,6 +15,7 @@
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{ERRORS_PER_AXIS, Machine};
 use abbe_model::component::{ErrorKind, ErrorName};
+use abbe_model::unit::Unit;
 use nalgebra::Vector3;
 
 use super::results::{Conflict, ConflictKind};
@@ -22,7 +23,6 @@ use crate::fit::Fit;
 use crate::parameters::Role;
 use crate::problem::Problem;
 use crate::results::COVERAGE_FACTOR;
-use crate::unit::ARCSEC;
 
 /// Largest share of a link by which an axis may lie beside its place; for angles, in radians.
 const MAX_SHARE: f64 = 0.05;
@@ -138,12 +138,12 @@ fn conflict(machine: &Machine, place: usize, judged: &Judged, value: f64, link: 
         ),
         (_, false) => format!("axis {name} is tilted by {:.2}° to the axis before it", value.abs().to_degrees()),
     };
-    let (unit, shown) = if judged.is_length { ("um", 1e3) } else { ("arcsec", ARCSEC) };
+    let unit = if judged.is_length { Unit::Micrometre } else { Unit::Arcsecond };
     Conflict {
         kind: judged.kind,
         subject: name.clone(),
-        value: value * shown,
-        stated: judged.limit * shown,
+        value: unit.to_display(value),
+        stated: unit.to_display(judged.limit),
         unit: unit.to_string(),
         pull: None,
         words,

@@ -33,7 +33,7 @@ use crate::fit::{Fit, ratio_of_another_unit};
 use crate::heldout::{rms_by_unit_mm, rms_mm};
 use crate::noise::NoiseSource;
 use crate::problem::Problem;
-use crate::unit::{ARCSEC, ReadingUnit};
+use abbe_model::unit::{RAD_PER_ARCSEC, Unit};
 
 /// Share of the variance of the measured positions that a model of poses explains at least.
 const MIN_EXPLAINED: f64 = 0.99;
@@ -255,11 +255,11 @@ const OF_LENGTHS: [(f64, &str); 2] =
 const OF_ANGLES: [(f64, &str); 3] = [
     (1.0 / 60.0, "arcminutes under arcseconds, degrees under arcminutes, or radians under degrees"),
     (1.0 / 3600.0, "degrees under arcseconds"),
-    (1.0 / ARCSEC, "radians under arcseconds"),
+    (RAD_PER_ARCSEC, "radians under arcseconds"),
 ];
 
 /// The unit in which readings are likely whose residual is this share of the stated noise.
-pub(crate) fn likely_unit(share: f64, unit: ReadingUnit) -> &'static str {
+pub(crate) fn likely_unit(share: f64, unit: Unit) -> &'static str {
     let known: &[(f64, &str)] = if unit.is_micrometre() { &OF_LENGTHS } else { &OF_ANGLES };
     let away = |factor: f64| (share.max(f64::MIN_POSITIVE) / factor).ln().abs();
     known.iter().min_by(|a, b| away(a.0).total_cmp(&away(b.0))).map_or("", |(_, words)| words)
@@ -278,11 +278,10 @@ fn of_another_unit(problem: &Problem, fit: &Fit) -> Option<Conflict> {
         pull: None,
         words: format!(
             "the residual is {:.0} times smaller than the stated noise of {}: the readings are probably in another unit than \
-             the name of their column states ({}), or were divided before; check them, or `{}`",
+             the name of their column states ({}), or were divided before; check them, or `noise_{unit}`",
             ratio.max(f64::MIN_POSITIVE).recip().min(LARGEST_FACTOR),
             unit.text(stated_mm * 1e3, 3),
             likely_unit(ratio, unit),
-            unit.noise_key()
         ),
     })
 }
@@ -304,9 +303,9 @@ fn set_ups(problem: &Problem, pulls: &Pulls) -> Vec<Conflict> {
                     "{} is {:.1} {} off where u = {} {} is stated ({:.1} standard deviations)",
                     parameter.id,
                     outside(pull.estimate),
-                    symbol(&parameter.unit.name),
+                    parameter.unit.symbol(),
                     outside(pull.stated_u),
-                    symbol(&parameter.unit.name),
+                    parameter.unit.symbol(),
                     pull.pull.abs()
                 ),
             }
@@ -327,15 +326,6 @@ fn set_ups(problem: &Problem, pulls: &Pulls) -> Vec<Conflict> {
             pulls.together, pulls.freedom
         ),
     }]
-}
-
-/// A unit as it is printed.
-fn symbol(unit: &str) -> &str {
-    match unit {
-        "um" => "µm",
-        "arcsec" => "″",
-        other => other,
-    }
 }
 
 /// Poses: what the model explains of the spread of the measured positions.

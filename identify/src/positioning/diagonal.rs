@@ -13,7 +13,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{FigureUncertainties, Figures, Place, Position, SAME, approaches, figures, places, uncertainty};
-use crate::unit::Unit;
 
 /// Least movement of an axis that moves, mm.
 const MOVES: f64 = 1e-3;
@@ -130,8 +129,8 @@ fn of_test(session: &Session, test: &Test, left_out: &[bool]) -> Option<Diagonal
     let mut nominal = readings.nominal(machine, &station);
     let nominal: Vec<f64> = (0..readings.rows()).map(|row| nominal(row).channels()[0]).collect();
     let way = Way::of(readings, &axes, &nominal)?;
-    let unit = Unit::of(channel.unit);
-    let factor = way.sign * unit.display_per_internal;
+    let unit = channel.unit.displayed();
+    let factor = way.sign * unit.per_internal();
     let deviation = |row: usize, values: &[f64]| (values[0] - nominal[row]) * factor;
     let positions = approaches(readings, left_out, 0, &way.places, |at| at, deviation);
     let [figures, shares] = figures::figures(&positions);
@@ -143,7 +142,7 @@ fn of_test(session: &Session, test: &Test, left_out: &[bool]) -> Option<Diagonal
         axes: axes.iter().map(|axis| machine.axes[*axis].name.clone()).collect(),
         direction: way.rises.iter().map(|rises| if *rises { 'P' } else { 'N' }).collect(),
         in_turn: way.in_turn,
-        unit: unit.name,
+        unit: unit.name().to_string(),
         length_mm: way.length,
         positions,
         figures,

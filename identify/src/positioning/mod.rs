@@ -15,7 +15,6 @@ use serde::Serialize;
 
 pub use self::figures::{Approach, Figures, Position};
 pub use self::uncertainty::FigureUncertainties;
-use crate::unit::Unit;
 
 /// Positions that agree to this are one, mm or rad.
 const SAME: f64 = 1e-4;
@@ -74,9 +73,9 @@ fn of_test(session: &Session, test: &Test, left_out: &[bool]) -> Option<Position
     if cosine.abs() < 1.0 - 1e-6 || channel.is_angle() != is_rotary {
         return None;
     }
-    let unit = Unit::of(channel.unit);
+    let unit = channel.unit.displayed();
     let kind = machine.axes[axis].kind;
-    let factor = sign * cosine.signum() * unit.display_per_internal;
+    let factor = sign * cosine.signum() * unit.per_internal();
     let mut nominal = readings.nominal(machine, &station);
     let nominal: Vec<f64> = (0..readings.rows()).map(|row| nominal(row).channels()[0]).collect();
     let deviation = |row: usize, values: &[f64]| (values[0] - nominal[row]) * factor;
@@ -95,7 +94,7 @@ fn of_test(session: &Session, test: &Test, left_out: &[bool]) -> Option<Position
     Some(PositioningTest {
         test: test.name.clone(),
         axis: machine.axes[axis].name.clone(),
-        unit: unit.name,
+        unit: unit.name().to_string(),
         position_unit: kind.unit().to_string(),
         positions,
         figures,

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use abbe_model::document::print::Block;
 use abbe_model::document::test::Test;
+use abbe_model::unit::Unit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, Serializer};
 
@@ -12,7 +13,6 @@ use super::outcome::TraceVerdict;
 use super::parameter::{Estimate, ParameterChange};
 use crate::plausibility::Plausibility;
 use crate::tolerance::Conformity;
-use crate::unit::ReadingUnit;
 
 /// An effect by its keys of session files.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -132,7 +132,7 @@ pub struct AliasResult {
 pub struct EffectResult {
     /// The unit of the figures of readings.
     #[serde(skip)]
-    pub unit: ReadingUnit,
+    pub unit: Unit,
     /// Component, driver, shape, order.
     #[serde(flatten)]
     pub name: EffectName,
@@ -270,8 +270,9 @@ pub struct Remainder {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct TraceResult {
     /// The unit of the figures of readings, in which their keys end; absent for µm.
-    #[serde(skip_serializing_if = "ReadingUnit::is_micrometre")]
-    pub reading_unit: ReadingUnit,
+    #[serde(skip_serializing_if = "Unit::is_micrometre")]
+    #[schemars(with = "String")]
+    pub reading_unit: Unit,
     /// `clean`, `explained`, `partly-explained`, `unexplained`; `not-judged` without a known noise; `incomplete` for an
     /// interrupted trace.
     pub verdict: TraceVerdict,

@@ -18,13 +18,13 @@ pub mod spectrum;
 
 use abbe_model::instrument::channel::Channel;
 use abbe_model::sensitivity::TestModel;
+use abbe_model::unit::Unit;
 
 use crate::error::IdentifyError;
 use crate::fit::Fit;
 use crate::heldout::rms_mm;
 use crate::parameters::Role;
 use crate::problem::Problem;
-use crate::unit::ReadingUnit;
 use abscissa::{Abscissa, PathSegment};
 
 /// The source of a share.
@@ -82,7 +82,7 @@ pub struct SessionSeries {
     pub tests: Vec<TestSeries>,
     /// The unit of all values. An angle beside lengths is the length that
     /// has the same noise, µm.
-    pub unit: ReadingUnit,
+    pub unit: Unit,
     /// Whether every reading is a vector.
     pub vectors: bool,
     /// The largest difference between the sum of shares and the model over all readings, µm.

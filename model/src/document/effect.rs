@@ -5,17 +5,11 @@ use serde::{Deserialize, Serialize};
 
 use super::node::Entries;
 use super::value::Positive;
-use crate::instrument::InternalUnit;
-use crate::quantity::{ARCSECOND, MICROMETRE};
+use crate::unit::InternalUnit;
 
 /// The keys of a stated standard deviation, with the internal unit of the component that has them.
 pub const SCALES: [(&str, InternalUnit); 2] =
     [("scale_um", InternalUnit::Millimetre), ("scale_arcsec", InternalUnit::Radian)];
-
-/// Internal units in one unit of a key of [`SCALES`]: mm in a micrometre, rad in an arcsecond.
-pub fn internal(unit: InternalUnit) -> f64 {
-    if unit == InternalUnit::Radian { ARCSECOND } else { MICROMETRE }
-}
 
 /// The word in `estimate` for the positions of a shape: the key of steps.
 pub const POSITIONS: &str = "at";

@@ -1,6 +1,6 @@
 //! From the domain to documents, which read back to the same bits.
 
-use super::effect::{self, SCALES, internal};
+use super::effect::{self, SCALES};
 use super::kind::Kind;
 use super::machine::{Axis, Machine};
 use super::movement::{Circle, Follow, Line, Path, Sweep};
@@ -16,6 +16,7 @@ use crate::instrument::set_up::rounded;
 use crate::instrument::{InstrumentKind, SharedBy};
 use crate::session::Test as DomainTest;
 use crate::session::motion::{FollowOffset, Motion};
+use crate::unit::Unit;
 use crate::{axis, chain};
 
 /// A machine without its bodies. Numbers read back to the same bits, except a direction, which the reader scales to
@@ -32,11 +33,10 @@ pub fn machine(machine: &chain::Machine) -> Machine {
 }
 
 fn axis(axis: &axis::Axis) -> Axis {
-    const DEGREES: DriverUnit = DriverUnit::new("deg", "rad", "deg", "°");
     let travel = |kind: AxisKind| axis.travel.filter(|_| axis.kind == kind).map(|ends| ends.to_vec());
     // Degrees that read back to the same radians, where there are such.
-    let degrees = |end: f64| match DEGREES.exact(end) {
-        ("deg", number) => number,
+    let degrees = |end: f64| match DriverUnit::ANGLE.exact(end) {
+        (Unit::Degree, number) => number,
         _ => end.to_degrees(),
     };
     Axis {
@@ -76,7 +76,7 @@ pub fn effect(effect: &Effect, machine: &chain::Machine) -> effect::Effect {
             let is_angle = effect.component.is_angle();
             let (_, unit) = SCALES[usize::from(is_angle)];
             let to = if is_angle { &mut document.scale_arcsec } else { &mut document.scale_um };
-            *to = Some(Positive(scale / internal(unit)));
+            *to = Some(Positive(scale / unit.displayed().internal()));
         }
     }
     document

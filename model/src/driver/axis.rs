@@ -10,22 +10,21 @@ use super::sample::{DriverPart, DriverSample};
 use super::unit::DriverUnit;
 use crate::axis::AxisKind;
 use crate::scalar::Nominal;
+use crate::unit::Unit;
 
 /// The position of an axis of this name.
 pub(super) struct AxisDriver<'a>(pub &'a str);
 
 /// Positions of a linear axis.
-pub(super) const MILLIMETRE: DriverUnit = DriverUnit::new("mm", "mm", "mm", " mm");
-/// Positions of a rotary axis: degrees in files, radians inside.
-pub(super) const ANGLE: DriverUnit = DriverUnit::new("deg", "rad", "deg", "°");
+pub(super) const MILLIMETRE: DriverUnit = DriverUnit::plain(Unit::Millimetre);
 
 pub(super) const ENTRY: Entry =
-    Entry { word: None, driver: |name| Driver::Axis(name.to_string()), units: &[MILLIMETRE, ANGLE] };
+    Entry { word: None, driver: |name| Driver::Axis(name.to_string()), units: &[MILLIMETRE, DriverUnit::ANGLE] };
 
 impl DriverKind for AxisDriver<'_> {
     fn unit(&self, axis: Option<AxisKind>) -> DriverUnit {
         match axis {
-            Some(AxisKind::Rotary) => ANGLE,
+            Some(AxisKind::Rotary) => DriverUnit::ANGLE,
             _ => MILLIMETRE,
         }
     }

@@ -14,6 +14,7 @@ use super::unit::DriverUnit;
 use crate::axis::AxisKind;
 use crate::scalar::Nominal;
 use crate::session::readings::Readings;
+use crate::unit::Unit;
 
 /// The values of a column, `NAME_unit`.
 pub(super) struct Column<'a>(pub &'a str);
@@ -25,9 +26,7 @@ pub const PREFIX: &str = "driver.";
 
 /// A unit of driver columns.
 struct ColumnUnit {
-    unit: DriverUnit,
-    /// The name in the unit of a coefficient.
-    per: &'static str,
+    unit: Unit,
     /// The divisor of powers if a session states none.
     scale: f64,
     /// Whether values count from the mean of the session, because the zero of the unit is a convention.
@@ -36,39 +35,38 @@ struct ColumnUnit {
     letter: char,
 }
 
-const fn unit(names: [&'static str; 4], scale: f64, from_mean: bool, letter: char) -> ColumnUnit {
-    let [suffix, result, symbol, per] = names;
-    ColumnUnit { unit: DriverUnit::new(suffix, suffix, result, symbol), per, scale, from_mean, letter }
+const fn unit(unit: Unit, scale: f64, from_mean: bool, letter: char) -> ColumnUnit {
+    ColumnUnit { unit, scale, from_mean, letter }
 }
 
-/// The units that the name of a column can end with. A difference of temperatures is in kelvins.
+/// The units that the name of a column can end with.
 const UNITS: [ColumnUnit; 19] = [
-    unit(["c", "K", " °C", "K"], 1.0, true, 'T'),
-    unit(["k", "K", " K", "K"], 1.0, true, 'T'),
-    unit(["pct", "%", " %", "%"], 1.0, true, 'q'),
-    unit(["hpa", "hPa", " hPa", "hPa"], 1.0, true, 'p'),
-    unit(["kpa", "kPa", " kPa", "kPa"], 1.0, false, 'p'),
-    unit(["mpa", "MPa", " MPa", "MPa"], 1.0, false, 'p'),
-    unit(["bar", "bar", " bar", "bar"], 1.0, false, 'p'),
-    unit(["kg", "kg", " kg", "kg"], 1.0, false, 'm'),
-    unit(["n", "N", " N", "N"], 1.0, false, 'F'),
-    unit(["nm", "N m", " N·m", "(N m)"], 1.0, false, 'M'),
-    unit(["rpm", "rpm", " rpm", "rpm"], 1000.0, false, 'n'),
-    unit(["hz", "Hz", " Hz", "Hz"], 1.0, false, 'f'),
-    unit(["a", "A", " A", "A"], 1.0, false, 'I'),
-    unit(["v", "V", " V", "V"], 1.0, false, 'U'),
-    unit(["w", "W", " W", "W"], 1000.0, false, 'P'),
-    unit(["kw", "kW", " kW", "kW"], 1.0, false, 'P'),
-    unit(["mm", "mm", " mm", "mm"], 1.0, false, 'q'),
-    unit(["um", "um", " µm", "um"], 1.0, false, 'q'),
-    unit(["deg", "deg", "°", "deg"], 1.0, false, 'q'),
+    unit(Unit::Celsius, 1.0, true, 'T'),
+    unit(Unit::Kelvin, 1.0, true, 'T'),
+    unit(Unit::Percent, 1.0, true, 'q'),
+    unit(Unit::Hectopascal, 1.0, true, 'p'),
+    unit(Unit::Kilopascal, 1.0, false, 'p'),
+    unit(Unit::Megapascal, 1.0, false, 'p'),
+    unit(Unit::Bar, 1.0, false, 'p'),
+    unit(Unit::Kilogram, 1.0, false, 'm'),
+    unit(Unit::Newton, 1.0, false, 'F'),
+    unit(Unit::NewtonMetre, 1.0, false, 'M'),
+    unit(Unit::PerMinute, 1000.0, false, 'n'),
+    unit(Unit::Hertz, 1.0, false, 'f'),
+    unit(Unit::Ampere, 1.0, false, 'I'),
+    unit(Unit::Volt, 1.0, false, 'U'),
+    unit(Unit::Watt, 1000.0, false, 'P'),
+    unit(Unit::Kilowatt, 1.0, false, 'P'),
+    unit(Unit::Millimetre, 1.0, false, 'q'),
+    unit(Unit::Micrometre, 1.0, false, 'q'),
+    unit(Unit::Degree, 1.0, false, 'q'),
 ];
 
 const DRIVER_UNITS: [DriverUnit; UNITS.len()] = {
-    let mut units = [UNITS[0].unit; UNITS.len()];
+    let mut units = [DriverUnit::plain(UNITS[0].unit); UNITS.len()];
     let mut k = 0;
     while k < units.len() {
-        units[k] = UNITS[k].unit;
+        units[k] = DriverUnit::plain(UNITS[k].unit);
         k += 1;
     }
     units
@@ -82,7 +80,7 @@ fn parts(name: &str) -> Option<(&str, &'static ColumnUnit)> {
     let (quantity, suffix) = name.rsplit_once('_')?;
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '_';
     let valid = quantity.starts_with(|c: char| c.is_ascii_alphabetic()) && quantity.chars().all(plain);
-    let unit = UNITS.iter().find(|known| known.unit.file == suffix).filter(|_| valid)?;
+    let unit = UNITS.iter().find(|known| known.unit.key() == suffix).filter(|_| valid)?;
     Some((quantity, unit))
 }
 
@@ -109,7 +107,7 @@ pub fn of_files(name: &str) -> Option<&str> {
 
 /// What to do about a driver column whose name is invalid.
 pub fn help_on_name() -> String {
-    let suffixes: Vec<String> = UNITS.iter().map(|known| format!("_{}", known.unit.file)).collect();
+    let suffixes: Vec<String> = UNITS.iter().map(|known| format!("_{}", known.unit.key())).collect();
     format!(
         "a driver column is `{PREFIX}NAME_unit`, such as `{PREFIX}spindle_temperature_c`; NAME has ASCII letters, digits \
          and `_`; units are {}",
@@ -134,7 +132,7 @@ pub(super) fn counts_from_mean(name: &str) -> bool {
 
 impl DriverKind for Column<'_> {
     fn unit(&self, _: Option<AxisKind>) -> DriverUnit {
-        self.unit_of_name().unit
+        DriverUnit::plain(self.unit_of_name().unit)
     }
     fn samples(&self, input: &DriverInput<'_>) -> Option<Vec<DriverSample<f64>>> {
         let values = match input.lag_s {
@@ -158,7 +156,10 @@ impl DriverKind for Column<'_> {
         Some(if recorded { "time_s".to_string() } else { in_files(self.0).into_owned() })
     }
     fn per(&self) -> Option<&'static str> {
-        Some(self.unit_of_name().per)
+        Some(match self.unit_of_name().unit {
+            Unit::NewtonMetre => "(N m)",
+            unit => DriverUnit::plain(unit).result(),
+        })
     }
     fn proportional(&self) -> Option<String> {
         Some(format!(", following {}", self.phrase()))
@@ -190,7 +191,7 @@ impl Symbols for Column<'_> {
             part: DriverPart::Value,
             identifier,
             text,
-            unit: unit.symbol.trim_start(),
+            unit: unit.symbol(),
             meaning,
             range: if *from_mean { [-5.0 * scale, 5.0 * scale] } else { [0.0, 10.0 * scale] },
         };

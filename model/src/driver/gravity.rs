@@ -11,6 +11,7 @@ use super::sample::{DriverPart, DriverSample};
 use super::unit::DriverUnit;
 use crate::axis::AxisKind;
 use crate::scalar::Nominal;
+use crate::unit::Unit;
 
 /// The moment of gravity.
 pub(super) struct Gravity<'n> {
@@ -18,8 +19,7 @@ pub(super) struct Gravity<'n> {
     pub at: Option<&'n str>,
 }
 
-pub(super) const METRE: DriverUnit = DriverUnit::new("m", "m", "m", " m");
-const MILLIMETRES_PER_METRE: f64 = 1000.0;
+pub(super) const METRE: DriverUnit = DriverUnit::plain(Unit::Metre);
 
 pub(super) const ENTRY: Entry = Entry { word: Some("gravity"), driver: |_| Driver::Gravity, units: &[METRE] };
 
@@ -41,7 +41,7 @@ impl DriverKind for Gravity<'_> {
             Some(loaded) => machine.gravity_moment_of_axis_mm(axis, &model.state(row), loaded),
             None => Some(machine.gravity_moment_mm(axis, &model.state(row), point?)),
         };
-        let sample = |row| Some(DriverSample::plain(moment(row)? / MILLIMETRES_PER_METRE, 0.0));
+        let sample = |row| Some(DriverSample::plain(Unit::Metre.to_display(moment(row)?), 0.0));
         (0..model.rows()).map(sample).collect()
     }
     fn phrase(&self) -> String {

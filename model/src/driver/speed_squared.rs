@@ -9,12 +9,13 @@ use super::unit::DriverUnit;
 use crate::axis::AxisKind;
 use crate::scalar::Nominal;
 use crate::session::readings::Readings;
+use crate::unit::Unit;
 
 /// The square of the speed.
 pub(super) struct SpeedSquared;
 
-const LINEAR: DriverUnit = DriverUnit::new("mm2_s2", "mm2_s2", "(mm/s)^2", " (mm/s)²");
-const ROTARY: DriverUnit = DriverUnit::new("rad2_s2", "rad2_s2", "(rad/s)^2", " (rad/s)²");
+const LINEAR: DriverUnit = DriverUnit::plain(Unit::SquareOfSpeed);
+const ROTARY: DriverUnit = DriverUnit::plain(Unit::SquareOfRate);
 
 /// The square of 100 mm/s, which is 6 m/min.
 const LINEAR_SCALE: f64 = 1e4;

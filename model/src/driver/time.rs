@@ -8,11 +8,12 @@ use super::unit::DriverUnit;
 use crate::axis::AxisKind;
 use crate::scalar::Nominal;
 use crate::session::readings::Readings;
+use crate::unit::Unit;
 
 /// Time.
 pub(super) struct Time;
 
-const SECOND: DriverUnit = DriverUnit::new("s", "s", "s", " s");
+const SECOND: DriverUnit = DriverUnit::plain(Unit::Second);
 /// Seconds per hour.
 pub const SECONDS_PER_HOUR: f64 = 3600.0;
 

@@ -4,8 +4,9 @@ use std::fmt;
 
 use crate::chain::Machine;
 use crate::component::ErrorName;
-use crate::instrument::{InstrumentParameter, InternalUnit, kinds};
+use crate::instrument::{InstrumentParameter, kinds};
 use crate::session::readings::Readings;
+use crate::unit::InternalUnit;
 
 /// The quantity that an effect changes.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -65,8 +66,7 @@ impl Component {
     /// not have.
     pub fn unit(&self, parameters: &[InstrumentParameter]) -> Option<InternalUnit> {
         match self {
-            Component::Axis(name) if name.freedom.is_angle() => Some(InternalUnit::Radian),
-            Component::Axis(_) => Some(InternalUnit::Millimetre),
+            Component::Axis(name) => Some(name.freedom.unit()),
             Component::Instrument { .. } => self.place(parameters).map(|place| parameters[place].unit),
             Component::TriggerDelay | Component::Reading(_) => None,
         }

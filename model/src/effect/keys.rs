@@ -7,6 +7,7 @@ use crate::document::from_node;
 use crate::document::node::{Entries, Node};
 use crate::driver::{DriverUnit, unit_suffixes};
 use crate::session::limits;
+use crate::unit::Unit;
 
 /// What a key holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,8 +76,8 @@ impl<'e> KeyReader<'e> {
                 continue;
             }
             if self.unit.to_internal(suffix, 0.0).is_none() {
-                let message = format!("`{name}` for a driver in {}", self.unit.file);
-                let help = format!("use `{}_{}`", key.name, self.unit.file);
+                let message = format!("`{name}` for a driver in {}", self.unit.file.key());
+                let help = format!("use `{}_{}`", key.name, self.unit.file.key());
                 return Err(Fault::new(message, help).on_key().at(&name));
             }
             if found.is_some() {
@@ -98,7 +99,7 @@ impl<'e> KeyReader<'e> {
     }
 
     fn missing_quantity(&self, key: &Key, example: &str) -> Fault {
-        let name = format!("{}_{}", key.name, self.unit.file);
+        let name = format!("{}_{}", key.name, self.unit.file.key());
         self.missing(&name, format!("add `{name} = {example}`"))
     }
 
@@ -189,17 +190,17 @@ impl KeyWriter {
 
     /// A number in the unit of the driver that reads back to the same bits.
     pub fn quantity(&mut self, key: &Key, value: f64) {
-        let (suffix, number) = self.unit.exact(value);
-        self.set(&format!("{}_{suffix}", key.name), number);
+        let (unit, number) = self.unit.exact(value);
+        self.set(&format!("{}_{}", key.name, unit.key()), number);
     }
 
     /// Several numbers in one unit: that of files if every one of them reads back to the same bits, else the internal
     /// unit.
     pub fn quantities(&mut self, key: &Key, values: &[f64]) {
         let unit = self.unit;
-        let all: Vec<(&str, f64)> = values.iter().map(|value| unit.exact(*value)).collect();
-        let exact = all.iter().all(|(suffix, _)| *suffix == unit.file);
-        let suffix = if exact { unit.file } else { unit.internal };
+        let all: Vec<(Unit, f64)> = values.iter().map(|value| unit.exact(*value)).collect();
+        let exact = all.iter().all(|(found, _)| *found == unit.file);
+        let suffix = if exact { unit.file } else { unit.internal }.key();
         let numbers: Node =
             values.iter().zip(all).map(|(value, (_, number))| if exact { number } else { *value }).collect();
         self.set(&format!("{}_{suffix}", key.name), numbers);
@@ -218,7 +219,7 @@ mod tests {
     /// Positions are degrees if all read back to the same bits, and radians if one does not.
     #[test]
     fn quantities_are_degrees_if_they_read_back() {
-        let unit = DriverUnit::new("deg", "rad", "deg", "°");
+        let unit = DriverUnit::ANGLE;
         let key = Key { name: "at", form: KeyForm::Quantities, meaning: "positions" };
         let written = |values: &[f64]| {
             let mut writer = KeyWriter::new(unit);
@@ -230,7 +231,7 @@ mod tests {
         let exact = [30.0_f64.to_radians(), -12.5_f64.to_radians()];
         assert_eq!(written(&exact), (Some(vec![30.0, -12.5]), None));
         // No number of degrees near it is this one.
-        let no_degrees = (1..10_000).map(|k| 1e-3 * f64::from(k)).find(|x| unit.exact(*x).0 == "rad").unwrap();
+        let no_degrees = (1..10_000).map(|k| 1e-3 * f64::from(k)).find(|x| unit.exact(*x).0 == Unit::Radian).unwrap();
         assert_eq!(written(&[no_degrees]), (None, Some(vec![no_degrees])));
         assert_eq!(written(&[exact[0], no_degrees]), (None, Some(vec![exact[0], no_degrees])));
     }

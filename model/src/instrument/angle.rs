@@ -25,6 +25,7 @@ use crate::rotation_error::Body;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::expression::Constant;
+use crate::unit::Unit;
 
 /// The zero of each channel.
 pub const PARAMETERS: [InstrumentParameter; 2] = [
@@ -47,8 +48,8 @@ const CHANNELS: [Channel; 2] = [Channel::angle("angle"), Channel::angle("angle2"
 
 /// The columns.
 const COLUMNS: [Column; 2] = [
-    Column::new("angle", "arcsec", Quantity::Channel(0)),
-    Column::new("angle2", "arcsec", Quantity::Channel(1)),
+    Column::new("angle", Unit::Arcsecond, Quantity::Channel(0)),
+    Column::new("angle2", Unit::Arcsecond, Quantity::Channel(1)),
 ];
 
 /// The keys of a test.

@@ -10,19 +10,16 @@ use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::check::{MAX_MM, doubt_on_scatter};
 use super::set_up::{self, SetUp};
-use super::{Contact, 
-    Checked, Entry, Fault, Following, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, InternalUnit, Reading,
-    SharedBy, Station, default_errors, displaced, point,
-};
+use super::{Contact, Checked, Entry, Fault, Following, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station, default_errors, displaced, point};
 use crate::median::median;
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
-use crate::quantity::MICROMETRE;
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::expression::Constant;
+use crate::unit::{InternalUnit, Unit};
 
 /// Both balls, the length of the bar, the gain of the sensor.
 pub const PARAMETERS: [InstrumentParameter; 8] = [
@@ -53,7 +50,7 @@ const CHANNELS: [Channel; 1] = [Channel::length("length")];
 
 /// The columns of a ball bar.
 const COLUMNS: [Column; 2] =
-    [Column::new("length", "mm", Quantity::Length), Column::new("deviation", "um", Quantity::Deviation)];
+    [Column::new("length", Unit::Millimetre, Quantity::Length), Column::new("deviation", Unit::Micrometre, Quantity::Deviation)];
 
 /// Balls that are closer to each other than this coincide, mm.
 const MIN_MM: f64 = 1e-6;
@@ -177,7 +174,7 @@ impl Instrument for BallBar<f64> {
     fn written(&self, priors: &[Prior]) -> Option<Node> {
         let keys = Keys {
             bar_mm: set_up::rounded(self.bar).into(),
-            bar_u_um: set_up::written_u(priors.get(BAR), MICROMETRE),
+            bar_u_um: set_up::written_u(priors.get(BAR), Unit::Micrometre),
             workpiece_ball_mm: set_up::written_point(self.workpiece_ball),
             workpiece_ball_u_um: set_up::written_lengths(priors, 0),
             spindle_ball_mm: set_up::written_point(self.spindle_ball),

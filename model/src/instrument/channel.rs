@@ -3,7 +3,7 @@
 //! An instrument reads one scalar or several of its targets: a length, three coordinates, a displacement and two angles.
 //! A row of readings has one value per channel; a value that was not read is NaN.
 
-use super::InternalUnit;
+use crate::unit::InternalUnit;
 
 /// One scalar of a reading.
 #[derive(Clone, Copy, Debug, PartialEq)]

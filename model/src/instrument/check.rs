@@ -3,7 +3,7 @@
 use super::channel::Channel;
 use super::kind::{Checked, Fault};
 use crate::median::median;
-use crate::quantity::ARCSECOND;
+use crate::unit::Unit;
 
 /// The sensor range is one to two millimetres for a ball bar and a few for an R-test. A larger deviation is not an
 /// error of the machine, mm.
@@ -23,7 +23,7 @@ pub(super) fn check_small(channels: &[Channel], checked: &Checked<'_>, skipped: 
         let mut values: Vec<f64> = read.filter(|value| !value.is_nan()).collect();
         let away = median_absolute_deviation(&mut values);
         let (most, limit, shown) = match channel.is_angle() {
-            true => (MAX_RAD, "2 mrad (412″)", format!("{:.1}″", away / ARCSECOND)),
+            true => (MAX_RAD, "2 mrad (412″)", format!("{:.1}″", Unit::Arcsecond.to_display(away))),
             false => (MAX_MM, "5 mm", format!("{away:.3} mm")),
         };
         if away > most {

@@ -1,5 +1,7 @@
 //! Columns of readings in data files: each instrument states its own.
 
+use crate::unit::Unit;
+
 /// What a column of readings holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
@@ -51,19 +53,19 @@ impl Quantity {
 pub struct Column {
     /// Its name without the unit.
     pub stem: &'static str,
-    /// The unit in which messages name it; empty for a column without one. A file may use any unit of length or angle.
-    pub unit: &'static str,
+    /// The unit in which messages name it; [`Unit::One`] for a column without one. A file may use any unit of length or angle.
+    pub unit: Unit,
     /// What it holds.
     pub quantity: Quantity,
 }
 
 impl Column {
-    pub(super) const fn new(stem: &'static str, unit: &'static str, quantity: Quantity) -> Column {
+    pub(super) const fn new(stem: &'static str, unit: Unit, quantity: Quantity) -> Column {
         Column { stem, unit, quantity }
     }
 
     /// Three coordinates.
-    pub(super) const fn vector(stems: [&'static str; 3], unit: &'static str) -> [Column; 3] {
+    pub(super) const fn vector(stems: [&'static str; 3], unit: Unit) -> [Column; 3] {
         let [x, y, z] = stems;
         let channel = Quantity::Channel;
         [Column::new(x, unit, channel(0)), Column::new(y, unit, channel(1)), Column::new(z, unit, channel(2))]
@@ -71,11 +73,11 @@ impl Column {
 
     /// Whether it is an angle.
     pub fn is_angle(&self) -> bool {
-        matches!(self.unit, "arcsec" | "deg")
+        self.unit.is_angle()
     }
 
     /// Its name, with a unit if it has one.
-    pub fn name(&self, unit: &str) -> String {
-        if self.unit.is_empty() { self.stem.to_string() } else { format!("{}_{unit}", self.stem) }
+    pub fn name(&self, unit: Unit) -> String {
+        if self.unit == Unit::One { self.stem.to_string() } else { format!("{}_{unit}", self.stem) }
     }
 }

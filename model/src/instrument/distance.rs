@@ -15,10 +15,10 @@ use super::{Aligned, Travel,
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
-use crate::quantity::MICROMETRE;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::expression::Constant;
+use crate::unit::Unit;
 
 /// The station, the reflector in the tool frame, the dead path.
 pub const PARAMETERS: [InstrumentParameter; 7] = [
@@ -47,7 +47,7 @@ pub(super) const ENTRY: Entry = Entry {
 const CHANNELS: [Channel; 1] = [Channel::length("distance")];
 
 /// The columns.
-const COLUMNS: [Column; 1] = [Column::new("distance", "mm", Quantity::Length)];
+const COLUMNS: [Column; 1] = [Column::new("distance", Unit::Millimetre, Quantity::Length)];
 
 /// Least distance: nearer, the direction of the beam is not defined, mm.
 const MIN_MM: f64 = 1.0;
@@ -154,7 +154,7 @@ impl Instrument for Distance<f64> {
             station_mm: set_up::written_point(self.station),
             station_u_um: set_up::written_lengths(priors, 0),
             station_frame: self.frame,
-            zero_u_um: set_up::written_u(priors.get(ZERO), MICROMETRE),
+            zero_u_um: set_up::written_u(priors.get(ZERO), Unit::Micrometre),
         };
         set_up::written(&keys, &["station_u_um", "zero_u_um"])
     }

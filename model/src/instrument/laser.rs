@@ -31,13 +31,13 @@ use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
-use crate::quantity::ARCSECOND;
 use crate::frames::{Point, cross, dot, dot_nominal};
 use crate::rotation_error::Body;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::expression::Constant;
 use crate::session::readings::Readings;
+use crate::unit::Unit;
 
 /// Reflector, optic, the beam's deviation, the zero of each channel.
 pub const PARAMETERS: [InstrumentParameter; 14] = [
@@ -80,13 +80,13 @@ const CHANNELS: [Channel; 6] = [
 
 /// The columns.
 const COLUMNS: [Column; 7] = [
-    Column::new("displacement", "mm", Quantity::Channel(0)),
-    Column::new("deviation", "um", Quantity::FromNominal(0)),
-    Column::new("horizontal", "um", Quantity::Channel(1)),
-    Column::new("vertical", "um", Quantity::Channel(2)),
-    Column::new("pitch", "arcsec", Quantity::Channel(3)),
-    Column::new("yaw", "arcsec", Quantity::Channel(4)),
-    Column::new("roll", "arcsec", Quantity::Channel(5)),
+    Column::new("displacement", Unit::Millimetre, Quantity::Channel(0)),
+    Column::new("deviation", Unit::Micrometre, Quantity::FromNominal(0)),
+    Column::new("horizontal", Unit::Micrometre, Quantity::Channel(1)),
+    Column::new("vertical", Unit::Micrometre, Quantity::Channel(2)),
+    Column::new("pitch", Unit::Arcsecond, Quantity::Channel(3)),
+    Column::new("yaw", Unit::Arcsecond, Quantity::Channel(4)),
+    Column::new("roll", Unit::Arcsecond, Quantity::Channel(5)),
 ];
 
 /// The channels of straightness.
@@ -353,7 +353,7 @@ impl Instrument for Laser<f64> {
         let mut node = set_up::written(&keys, &[])?;
         if self.is_beam_stated {
             // Zero is stated too: without it the direction is estimated with a straightness.
-            node.set("beam_u_arcsec", set_up::written_u(priors.get(BEAM), ARCSECOND).0);
+            node.set("beam_u_arcsec", set_up::written_u(priors.get(BEAM), Unit::Arcsecond).0);
         }
         Some(node)
     }

@@ -14,7 +14,7 @@ pub mod stand;
 
 pub use kind::{Checked, Entry, Fault, Geometry, Group, Instrument, InstrumentPoint, Misreading, MisreadingKind};
 pub use operation::{Aligned, Contact, Following, Handling, Travel};
-pub use parameter::{InstrumentParameter, InternalUnit, SharedBy};
+pub use parameter::{InstrumentParameter, SharedBy};
 
 use std::ops::{Deref, DerefMut};
 use std::str::FromStr;

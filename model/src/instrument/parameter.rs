@@ -1,5 +1,7 @@
 //! Parameters of an instrument: what a fit may estimate of its set-up.
 
+use crate::unit::InternalUnit;
+
 /// The tests that share an instrument parameter: those that use the same mounted object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum SharedBy {
@@ -57,15 +59,4 @@ impl InstrumentParameter {
     ) -> InstrumentParameter {
         InstrumentParameter::new(thing, coordinate, InternalUnit::Radian, shared_by)
     }
-}
-
-/// Internal unit of a quantity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum InternalUnit {
-    /// mm; displayed in µm.
-    Millimetre,
-    /// rad; displayed in arcsec.
-    Radian,
-    /// Dimensionless; displayed in µm/m.
-    Ratio,
 }

@@ -22,12 +22,12 @@ use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
-use crate::quantity::ARCSECOND;
 use crate::frames::{Point, cross, dot};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::readings::Readings;
 use crate::session::expression::Constant;
+use crate::unit::Unit;
 
 /// The direction of the line of sight: across and up.
 pub const PARAMETERS: [InstrumentParameter; 2] = [
@@ -48,8 +48,8 @@ const CHANNELS: [Channel; 2] = [Channel::angle("across"), Channel::angle("up")];
 
 /// The columns.
 const COLUMNS: [Column; 2] = [
-    Column::new("true_azimuth", "deg", Quantity::Channel(0)),
-    Column::new("true_elevation", "deg", Quantity::Channel(1)),
+    Column::new("true_azimuth", Unit::Degree, Quantity::Channel(0)),
+    Column::new("true_elevation", Unit::Degree, Quantity::Channel(1)),
 ];
 
 /// The keys of a test.
@@ -147,7 +147,7 @@ impl Instrument for Pointing<f64> {
         };
         let mut node = set_up::written(&keys, &[])?;
         if !is_default {
-            node.set("line_of_sight_u_arcsec", set_up::written_u(priors.first(), ARCSECOND).0);
+            node.set("line_of_sight_u_arcsec", set_up::written_u(priors.first(), Unit::Arcsecond).0);
         }
         Some(node)
     }

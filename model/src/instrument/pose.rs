@@ -32,6 +32,7 @@ use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::expression::Constant;
 use crate::session::readings::Readings;
+use crate::unit::Unit;
 
 const POSE: [InstrumentParameter; 6] = stand::parameters("station");
 
@@ -77,16 +78,16 @@ const CHANNELS: [Channel; 6] =
 
 /// The columns: position, then the rotation vector or the quaternion of the orientation.
 const COLUMNS: [Column; 10] = [
-    Column::new("px", "mm", Quantity::Channel(0)),
-    Column::new("py", "mm", Quantity::Channel(1)),
-    Column::new("pz", "mm", Quantity::Channel(2)),
-    Column::new("rx", "deg", Quantity::Channel(3)),
-    Column::new("ry", "deg", Quantity::Channel(4)),
-    Column::new("rz", "deg", Quantity::Channel(5)),
-    Column::new("qx", "", Quantity::Quaternion(0)),
-    Column::new("qy", "", Quantity::Quaternion(1)),
-    Column::new("qz", "", Quantity::Quaternion(2)),
-    Column::new("qw", "", Quantity::Quaternion(3)),
+    Column::new("px", Unit::Millimetre, Quantity::Channel(0)),
+    Column::new("py", Unit::Millimetre, Quantity::Channel(1)),
+    Column::new("pz", Unit::Millimetre, Quantity::Channel(2)),
+    Column::new("rx", Unit::Degree, Quantity::Channel(3)),
+    Column::new("ry", Unit::Degree, Quantity::Channel(4)),
+    Column::new("rz", Unit::Degree, Quantity::Channel(5)),
+    Column::new("qx", Unit::One, Quantity::Quaternion(0)),
+    Column::new("qy", Unit::One, Quantity::Quaternion(1)),
+    Column::new("qz", Unit::One, Quantity::Quaternion(2)),
+    Column::new("qw", Unit::One, Quantity::Quaternion(3)),
 ];
 
 /// The keys of a test.

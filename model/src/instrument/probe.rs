@@ -27,11 +27,11 @@ use super::{Contact,
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
-use crate::quantity::MICROMETRE;
 use crate::frames::{Point, cross, dot};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::expression::Constant;
+use crate::unit::Unit;
 
 /// The pose of the artefact on the table, its radius, its form deviation; the stylus in the tool frame.
 pub const PARAMETERS: [InstrumentParameter; 11] = [
@@ -66,7 +66,7 @@ const CHANNELS: [Channel; 1] = [Channel::length("distance")];
 
 /// The columns of a probe.
 const COLUMNS: [Column; 2] =
-    [Column::new("distance", "mm", Quantity::Length), Column::new("deviation", "um", Quantity::Outward)];
+    [Column::new("distance", Unit::Millimetre, Quantity::Length), Column::new("deviation", Unit::Micrometre, Quantity::Outward)];
 
 /// The keys of a test.
 #[derive(Serialize, Deserialize, JsonSchema)]
@@ -264,7 +264,7 @@ impl Instrument for Probe<f64> {
             artefact_u_arcsec: set_up::written_angles(priors, 3),
             artefact_axis: (self.axis != [0.0, 0.0, 1.0]).then(|| set_up::written_direction(self.axis)),
             radius_mm: set_up::rounded(self.radius).into(),
-            radius_u_um: set_up::written_u(priors.get(RADIUS), MICROMETRE),
+            radius_u_um: set_up::written_u(priors.get(RADIUS), Unit::Micrometre),
             stylus_mm: set_up::written_point(self.stylus),
             stylus_u_um: set_up::written_lengths(priors, STYLUS),
             direction: self.direction.map(set_up::written_direction),

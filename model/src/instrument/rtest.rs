@@ -33,6 +33,7 @@ use crate::frames::{Coordinate, Point, Rotation, SinCos, cross, turn_about};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::expression::Constant;
+use crate::unit::Unit;
 
 /// Both points, then ω₁, φ₁ and θ₁ of the nest.
 pub const PARAMETERS: [InstrumentParameter; 9] = [
@@ -61,8 +62,8 @@ const VECTOR_CHANNELS: [Channel; 3] = Channel::vector(["dx", "dy", "dz"]);
 const SENSOR_CHANNELS: [Channel; 3] = Channel::vector(["du", "dv", "dw"]);
 
 /// The columns of a vector in the frame that carries the sensors, and those of the single sensors.
-const VECTOR: [Column; 3] = Column::vector(["dx", "dy", "dz"], "um");
-const SENSORS: [Column; 3] = Column::vector(["du", "dv", "dw"], "um");
+const VECTOR: [Column; 3] = Column::vector(["dx", "dy", "dz"], Unit::Micrometre);
+const SENSORS: [Column; 3] = Column::vector(["du", "dv", "dw"], Unit::Micrometre);
 
 /// The columns of two directions, or of two sensors, are exchanged.
 const VECTOR_EXCHANGED: [Misreading; 3] = [
@@ -77,7 +78,7 @@ const SENSORS_EXCHANGED: [Misreading; 3] = [
 ];
 
 const fn exchanged<const A: usize, const B: usize>(columns: &'static str, words: &'static str) -> Misreading {
-    Misreading { columns, words, reread: |values| values.swap(A, B) }
+    Misreading { kind: super::MisreadingKind::Order, columns, words, reread: |values| values.swap(A, B) }
 }
 
 /// Least triple product of three measuring directions. Below it, one coordinate has twenty times the noise.

@@ -11,10 +11,10 @@ use crate::document::node::{Node, Value};
 use crate::document::print::node_of;
 use crate::document::value::{self as document, Point, Three, Uncertainties, Uncertainty};
 use crate::document::{from_node, schema};
-use crate::quantity::{ARCSECOND, MICROMETRE};
 use crate::session::Prior;
 use crate::session::expression::{Constant, Length};
 use crate::session::limits;
+use crate::unit::Unit;
 
 /// A nominal length, as written and in mm.
 #[derive(Clone, Debug)]
@@ -87,22 +87,22 @@ pub(super) fn written_direction(direction: [f64; 3]) -> document::Direction {
 }
 
 /// The uncertainty of a length, µm, or of an angle, arcsec, from its prior.
-pub(super) fn written_u(prior: Option<&Prior>, unit: f64) -> Uncertainty {
+pub(super) fn written_u(prior: Option<&Prior>, unit: Unit) -> Uncertainty {
     Uncertainty(match prior {
         None | Some(Prior::Known) => 0.0,
-        Some(Prior::Gaussian(u)) => rounded(u / unit),
+        Some(Prior::Gaussian(u)) => rounded(unit.to_display(*u)),
         Some(Prior::Free) => f64::INFINITY,
     })
 }
 
 /// The uncertainties of three parameters from the first, lengths in µm.
 pub(super) fn written_lengths(priors: &[Prior], first: usize) -> Uncertainties {
-    Uncertainties([0, 1, 2].map(|i| written_u(priors.get(first + i), MICROMETRE)))
+    Uncertainties([0, 1, 2].map(|i| written_u(priors.get(first + i), Unit::Micrometre)))
 }
 
 /// The same of angles, arcsec.
 pub(super) fn written_angles(priors: &[Prior], first: usize) -> Uncertainties {
-    Uncertainties([0, 1, 2].map(|i| written_u(priors.get(first + i), ARCSECOND)))
+    Uncertainties([0, 1, 2].map(|i| written_u(priors.get(first + i), Unit::Arcsecond)))
 }
 
 /// The keys of a set-up. A missing one is explained by its documentation.
@@ -134,7 +134,7 @@ pub(super) fn lengths(Uncertainties(u): &Uncertainties) -> impl Iterator<Item = 
 
 /// The prior of a length from its uncertainty, µm.
 pub(super) fn length(u: Uncertainty) -> Prior {
-    prior(u, MICROMETRE)
+    prior(u, Unit::Micrometre)
 }
 
 /// Priors of angles from their uncertainties, arcsec.
@@ -144,13 +144,13 @@ pub(super) fn angles(Uncertainties(u): &Uncertainties) -> impl Iterator<Item = P
 
 /// The prior of an angle from its uncertainty, arcsec.
 pub(super) fn angle(u: Uncertainty) -> Prior {
-    prior(u, ARCSECOND)
+    prior(u, Unit::Arcsecond)
 }
 
-fn prior(Uncertainty(u): Uncertainty, unit: f64) -> Prior {
+fn prior(Uncertainty(u): Uncertainty, unit: Unit) -> Prior {
     match u {
         0.0 => Prior::Known,
         u if u.is_infinite() => Prior::Free,
-        u => Prior::Gaussian(u * unit),
+        u => Prior::Gaussian(unit.to_internal(u)),
     }
 }

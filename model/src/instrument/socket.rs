@@ -19,6 +19,7 @@ use crate::document::{Fault as KeyFault, schema, value as document};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::expression::Constant;
+use crate::unit::Unit;
 
 /// The socket in R, then the ball in the tool frame.
 pub const PARAMETERS: [InstrumentParameter; 6] = [
@@ -44,7 +45,7 @@ pub(super) const ENTRY: Entry = Entry {
 const CHANNELS: [Channel; 3] = Channel::vector(["x", "y", "z"]);
 
 /// The column of a socket: a pose consists of axis positions only.
-const COLUMNS: [Column; 1] = [Column::new("socket", "", Quantity::Socket)];
+const COLUMNS: [Column; 1] = [Column::new("socket", Unit::One, Quantity::Socket)];
 
 /// The keys of a test.
 #[derive(Serialize, Deserialize, JsonSchema)]

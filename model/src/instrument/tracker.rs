@@ -29,6 +29,7 @@ use crate::frames::{Point, cross};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::expression::Constant;
+use crate::unit::Unit;
 
 const POSE: [InstrumentParameter; 6] = stand::parameters("tracker");
 
@@ -63,13 +64,13 @@ const POLAR: [Channel; 3] = [Channel::length("range"), Channel::angle("across"),
 
 /// The columns of range and angles.
 const OF_POLAR: [Column; 3] = [
-    Column::new("range", "mm", Quantity::Polar(0)),
-    Column::new("azimuth", "deg", Quantity::Polar(1)),
-    Column::new("elevation", "deg", Quantity::Polar(2)),
+    Column::new("range", Unit::Millimetre, Quantity::Polar(0)),
+    Column::new("azimuth", Unit::Degree, Quantity::Polar(1)),
+    Column::new("elevation", Unit::Degree, Quantity::Polar(2)),
 ];
 
 /// The columns of coordinates.
-const OF_CARTESIAN: [Column; 3] = Column::vector(["px", "py", "pz"], "mm");
+const OF_CARTESIAN: [Column; 3] = Column::vector(["px", "py", "pz"], Unit::Millimetre);
 
 /// The columns, those of a tracker with coordinates first.
 const CARTESIAN_FIRST: [Column; 6] =

@@ -1,5 +1,6 @@
 //! Limits of numbers in input. Within them nothing overflows and angles remain accurate.
 
+use crate::unit::Unit;
 use crate::words;
 
 /// The largest number that input may contain, in the unit of its name. A position of 10¹² is resolved to 10⁻⁴; in
@@ -20,10 +21,9 @@ pub fn too_large(number: f64) -> Option<String> {
 
 /// As [`too_large`], for a number with a name: the limit of a length in mm, m or inches is [`MAX_LENGTH_MM`].
 pub fn too_large_for(name: &str, number: f64) -> Option<String> {
-    let mm = match name.rsplit_once('_').map(|(_, unit)| unit) {
-        Some("mm") => number,
-        Some("m") => 1e3 * number,
-        Some("in") => 25.4 * number,
+    let unit = name.rsplit_once('_').and_then(|(_, unit)| Unit::parse(unit));
+    let mm = match unit {
+        Some(unit @ (Unit::Millimetre | Unit::Metre | Unit::Inch)) => unit.to_internal(number),
         _ => return too_large(number),
     };
     (number.is_finite() && mm.abs() > MAX_LENGTH_MM)

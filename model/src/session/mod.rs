@@ -22,12 +22,13 @@ use crate::component::ErrorName;
 use crate::driver::Reference;
 use crate::effect::Effect;
 use crate::instrument::{Entry, InstrumentKind, InstrumentParameter, SharedBy, Station};
+use crate::unit::{ARCSEC_PER_RAD, MM_PER_UM, Unit};
 use expression::Constant;
 use readings::Readings;
 use tolerance::Tolerance;
 
 /// The lever at which one arcsecond is one micrometre, mm.
-pub const NATURAL_LEVER_MM: f64 = 1e-3 * 180.0 * 3600.0 / std::f64::consts::PI;
+pub const NATURAL_LEVER_MM: f64 = MM_PER_UM * ARCSEC_PER_RAD;
 
 /// A validated session. Lengths in mm, angles in rad.
 #[derive(Clone, Debug)]
@@ -108,6 +109,12 @@ impl Session {
             lengths: channels().any(|channel| !channel.is_angle()),
             angles: channels().any(|channel| channel.is_angle()),
         }
+    }
+
+    /// The unit of the figures of readings (noise, residuals, held-out errors): arcsec if all channels are angles, else
+    /// µm. Keys of results end in it.
+    pub fn reading_unit(&self) -> Unit {
+        if self.units().only_angles() { Unit::Arcsecond } else { Unit::Micrometre }
     }
 
     /// Whether the lever is not to be estimated: it is stated or estimated, or there are no lengths beside angles.

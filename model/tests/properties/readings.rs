@@ -3,14 +3,15 @@
 use std::sync::Arc;
 
 use abbe_model::axis::AxisKind;
+use abbe_model::instrument::Station;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::rtest::{RTest, Setting};
 use abbe_model::instrument::socket::Socket;
 use abbe_model::instrument::stand::Stand;
 use abbe_model::instrument::tracker::Tracker;
-use abbe_model::instrument::{InternalUnit, Station};
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
+use abbe_model::unit::InternalUnit;
 use proptest::collection::vec;
 use proptest::prelude::*;
 

@@ -141,7 +141,7 @@ fn sheet(
         let display = |q: f64| axis.kind.to_display(q);
         AxisRange {
             name: axis.name.clone(),
-            unit: axis.kind.unit(),
+            unit: axis.kind.unit().name(),
             start: display(column[0]),
             least: display(column.iter().copied().fold(f64::INFINITY, f64::min)),
             greatest: display(column.iter().copied().fold(f64::NEG_INFINITY, f64::max)),

@@ -36,7 +36,7 @@ pub fn axes_of(problem: &Problem, test: &TestSeries, number: usize) -> Vec<(Plot
         let values = readings.positions[*axis].iter().map(|q| q * display).collect();
         let axis = PlotAxis {
             name: problem.session.machine.axes[*axis].name.clone(),
-            unit: problem.session.machine.axes[*axis].kind.unit(),
+            unit: problem.session.machine.axes[*axis].kind.unit().name(),
             is_angle,
         };
         (axis, values)

@@ -125,8 +125,8 @@ pub(super) fn curve_units(problem: &Problem, effect: &Effect) -> (String, String
         return (String::new(), String::new());
     }
     (
-        effect.driver_unit(&problem.session.machine).result.to_string(),
-        abbe_identify::unit::Unit::of_effect(&problem.session, effect, 0).name,
+        effect.driver_unit(&problem.session.machine).result().to_string(),
+        abbe_identify::unit::ParameterUnit::of_effect(&problem.session, effect, 0).name,
     )
 }
 

@@ -218,7 +218,7 @@ fn shape_parameters_of(problem: &Problem, effect: &Effect, of_positions: &[Optio
         values: values.into_iter().map(|value| unit.to_display(value)).collect(),
         intervals_95: of_positions.iter().map(|ends| ends.map(|ends| ends.map(|end| unit.to_display(end)))).collect(),
         // The number of a lag is its time constant.
-        unit: if effect.shape.lag_s().is_some() { "s" } else { unit.result }.to_string(),
+        unit: if effect.shape.lag_s().is_some() { "s" } else { unit.result() }.to_string(),
     };
     effect.shape.reported().into_iter().map(number).collect()
 }

@@ -11,7 +11,6 @@ use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::Estimate;
 use abbe_identify::results::validation::RmsResult;
-use abbe_identify::unit::ReadingUnit;
 use abbe_model::component::ErrorName;
 use abbe_model::session::Prior;
 use abbe_model::session::Session;
@@ -363,12 +362,12 @@ fn first_noise(model: &IdentifiedModel, session: &Session) -> Result<(Noise, Noi
     if let Some(sigma) = session.stated_noise_mm() {
         return Ok((Noise::white(sigma, NoiseSource::Stated), NoiseSource::Stated));
     }
-    let unit = ReadingUnit::of(session);
+    let unit = session.reading_unit();
     if model.unit != unit {
         return Err(IdentifyError::Missing {
             of: "the session".to_string(),
             what: format!("noise, and that of the model is in {}", model.unit.symbol()),
-            remedy: format!("state `{}` in [instrument]", unit.noise_key()),
+            remedy: format!("state `noise_{unit}` in [instrument]"),
         });
     }
     let noise = match model.noise.source {

@@ -150,7 +150,7 @@ pub fn validate_anew(
     let not_judged = model.forbids_decisions().map(|why| ModelNotJudged {
         session: model.provenance.session.clone(),
         is_traced: model.provenance.command == "trace",
-        birge_ratio: model.quality.u_enlargement,
+        birge_ratio: model.fit.u_enlargement,
         why: why.to_string(),
     });
     let prediction = &all.prediction;

@@ -93,7 +93,7 @@ fn entries(entry: &Entry, unit: DriverUnit, mut numbers: VecDeque<f64>) -> Entri
         let name = match key.form {
             KeyForm::Flag => continue,
             KeyForm::Positive | KeyForm::Count(..) => key.name.to_string(),
-            KeyForm::Quantity | KeyForm::Quantities => format!("{}_{}", key.name, unit.file),
+            KeyForm::Quantity | KeyForm::Quantities => format!("{}_{}", key.name, unit.file.key()),
         };
         match key.name {
             "scale" => {}

@@ -4,11 +4,12 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use abbe_model::axis::AxisKind;
 use abbe_model::instrument::Fault;
+use abbe_model::unit::{Dimension, Unit};
 use abbe_model::words::number;
 
 use super::DhRow;
 use super::row::RowRead;
-use crate::import::unit::{self, Dimension, Unit};
+use crate::import::unit;
 
 /// Lengths of a table whose largest is below this are in m.
 const LARGEST_M: f64 = 10.0;
@@ -49,16 +50,16 @@ pub(super) struct Columns {
 /// First characters of the columns that an exported table has beside its parameters.
 const BESIDE: [&str; 2] = ["u_", "nominal_"];
 
-const DEGREE: Unit = Unit::of_own("deg");
-const RADIAN: Unit = Unit::of_own("rad");
-const METRE: Unit = Unit::of_own("m");
-const MILLIMETRE: Unit = Unit::of_own("mm");
-
 impl Columns {
     /// The columns of a line of names.
     pub fn of(names: &[String]) -> Result<Columns, Fault> {
-        let mut columns =
-            Columns { places: Vec::new(), angle: DEGREE, limit: DEGREE, length: MILLIMETRE, unread: Vec::new() };
+        let mut columns = Columns {
+            places: Vec::new(),
+            angle: Unit::Degree,
+            limit: Unit::Degree,
+            length: Unit::Millimetre,
+            unread: Vec::new(),
+        };
         for (place, name) in names.iter().enumerate() {
             if BESIDE.iter().any(|beside| name.starts_with(beside)) {
                 columns.unread.push(name.clone());
@@ -83,7 +84,7 @@ impl Columns {
                 _ => &[],
             };
             match named.unit {
-                Some(unit) if unit.is_ambiguous() => {
+                Some(Unit::Grad) => {
                     let help = "write deg for a degree, or gon for a hundredth of a right angle";
                     return Err((format!("column `{name}`: grad may be a degree or a gon"), help.into()));
                 }
@@ -137,19 +138,22 @@ impl Columns {
         // Angles of a table are quarter turns, nearly all of them.
         let is_quarter = |angle: &f64| ((angle / FRAC_PI_2).round() * FRAC_PI_2 - angle).abs() < QUARTER;
         let are_rad = !numbers.is_empty() && numbers.iter().all(|angle| *angle <= TAU && is_quarter(angle));
-        let angle = stated(Dimension::Angle, &ANGLES).unwrap_or(if are_rad { RADIAN } else { DEGREE });
+        let angle = stated(Dimension::Angle, &ANGLES).unwrap_or(if are_rad { Unit::Radian } else { Unit::Degree });
         let (limits, numbers) = open(Dimension::Angle, &["lower", "upper"]);
-        let limit = if numbers.iter().all(|angle| *angle <= TAU) { RADIAN } else { DEGREE };
+        let limit = if numbers.iter().all(|angle| *angle <= TAU) { Unit::Radian } else { Unit::Degree };
         let (lengths, numbers) = open(Dimension::Length, &["d", "a", "offset", "lower", "upper"]);
         let largest = numbers.iter().copied().fold(0.0, f64::max);
-        let length =
-            stated(Dimension::Length, &["d", "a"]).unwrap_or(if largest < LARGEST_M { METRE } else { MILLIMETRE });
+        let length = stated(Dimension::Length, &["d", "a"]).unwrap_or(if largest < LARGEST_M {
+            Unit::Metre
+        } else {
+            Unit::Millimetre
+        });
         let said =
             [("angles", angles, angle), ("limits of rotary joints", limits, limit), ("lengths", lengths, length)];
         (self.angle, self.limit, self.length) = (angle, limit, length);
         said.into_iter()
             .filter(|(_, columns, _)| !columns.is_empty())
-            .map(|(what, _, unit)| format!("the unit of the {what} is not stated: {}", unit.word()))
+            .map(|(what, _, unit)| format!("the unit of the {what} is not stated: {}", unit.key()))
             .collect()
     }
 
@@ -174,7 +178,7 @@ impl Columns {
         let largest = if dimension == Dimension::Length { MAX_MM } else { MAX_RAD };
         if found.abs() > largest {
             return Err((
-                format!("`{own}` of joint `{}` is {} {}", row.name, number(value.plain), unit.word()),
+                format!("`{own}` of joint `{}` is {} {}", row.name, number(value.plain), unit.key()),
                 "check its unit: no robot is that large".into(),
             ));
         }

@@ -2,9 +2,9 @@
 
 use abbe_model::axis::AxisKind;
 use abbe_model::instrument::Fault;
+use abbe_model::unit::Dimension;
 
 use super::cell::Value;
-use crate::import::unit::Dimension;
 
 /// The columns with numbers.
 const PARAMETERS: [&str; 8] = ["a", "alpha", "beta", "d", "theta", "offset", "lower", "upper"];

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::session::{Session, Test};
+use abbe_model::unit::Unit;
 
 use super::results::SuggestionKind;
 
@@ -151,8 +152,8 @@ pub(super) fn columns_exchanged(session: &Session, axes: &[usize]) -> Vec<Hypoth
 pub(super) fn units(kind: AxisKind) -> Vec<(f64, &'static str)> {
     match kind {
         AxisKind::Rotary => vec![
-            (180.0 / std::f64::consts::PI, "in radians, not in degrees"),
-            (std::f64::consts::PI / 180.0, "in degrees, not in radians"),
+            (Unit::Degree.per_internal(), "in radians, not in degrees"),
+            (Unit::Degree.internal(), "in degrees, not in radians"),
         ],
         AxisKind::Linear => lengths().to_vec(),
     }
@@ -161,10 +162,10 @@ pub(super) fn units(kind: AxisKind) -> Vec<(f64, &'static str)> {
 /// The same for lengths.
 pub(super) fn lengths() -> [(f64, &'static str); 4] {
     [
-        (1e3, "1,000 times too small: in m, not in mm, or in mm, not in µm"),
-        (1e-3, "1,000 times too large: in µm, not in mm, or in mm, not in m"),
-        (25.4, "in inches, not in mm"),
-        (1.0 / 25.4, "in mm, not in inches"),
+        (Unit::Metre.internal(), "1,000 times too small: in m, not in mm, or in mm, not in µm"),
+        (Unit::Micrometre.internal(), "1,000 times too large: in µm, not in mm, or in mm, not in m"),
+        (Unit::Inch.internal(), "in inches, not in mm"),
+        (Unit::Inch.per_internal(), "in mm, not in inches"),
     ]
 }
 

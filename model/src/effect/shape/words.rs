@@ -29,7 +29,7 @@ impl EffectWords {
     }
     /// A position, period or width of the driver, with its unit.
     pub fn at_value(&self, value: f64) -> String {
-        format!("{}{}", four_digits(self.unit.to_display(value)), self.unit.symbol)
+        self.unit.file.behind(four_digits(self.unit.to_display(value)))
     }
 }
 

@@ -15,9 +15,9 @@ use std::sync::{Arc, Mutex, OnceLock};
 use abbe_identify::error::IdentifyError;
 use abbe_identify::numerics::parallel;
 use abbe_identify::problem::{Problem, RowBlock};
-use abbe_identify::unit::ReadingUnit;
 use abbe_model::driver::DriverSample;
 use abbe_model::sensitivity::Sensitivities;
+use abbe_model::unit::Unit;
 pub use adjoint::{Adjoint, TrainingRows, WhitenedRows};
 pub use basis::{EffectColumns, chunked};
 use faer::{Mat, MatMut};
@@ -106,7 +106,7 @@ impl<'p> Columns<'p> {
     }
 
     /// The unit of figures of readings.
-    pub fn unit(&self) -> ReadingUnit {
+    pub fn unit(&self) -> Unit {
         self.problem.unit()
     }
 
