@@ -156,8 +156,8 @@ mod tests {
     /// A plan with another set-up than the file's writes no session.
     #[test]
     fn a_plan_of_another_set_up_is_proposed_with_it() {
-        let options = [("--setup-um", "1".to_string())];
-        let commands = Commands::of(Path::new("s.toml"), None, false).made_by("plan", &options);
+        let options = json!({"setup_um": 1.0});
+        let commands = Commands::of(Path::new("s.toml"), None, false).made_by("plan", options.as_object().unwrap());
         assert_eq!(commands.command("plan", "--improve"), "abbe plan s.toml --setup-um 1 --improve");
         assert!(!commands.plan_writes() && Commands::default().plan_writes());
     }

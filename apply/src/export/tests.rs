@@ -5,7 +5,6 @@ use abbe_identify::model_file::{IdentifiedModel, ModelParameter, Provenance};
 use abbe_identify::noise::{Noise, NoiseSource};
 use abbe_identify::parameters::Role;
 use abbe_identify::results::ModelFit;
-use abbe_identify::unit::Unit;
 use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::frames::Point;
 use abbe_model::session::Prior;
@@ -42,7 +41,7 @@ pub(super) fn model(machine: Machine, errors: &[(String, f64)]) -> IdentifiedMod
         null_directions: Vec::new(),
         locations: Vec::new(),
         noise: Noise::white(1e-4, NoiseSource::Stated),
-        unit: abbe_identify::unit::ReadingUnit::Micrometre,
+        unit: Unit::Micrometre,
         fit: ModelFit { readings: 1, rms_um: 0.0, heldout_rms_um: 0.0, u_enlargement: 1.0 },
         ranges: Vec::new(),
         motion_ranges: Vec::new(),

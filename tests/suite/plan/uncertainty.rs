@@ -92,7 +92,7 @@ fn squares(code: &str, first_seed: usize, complete_fit: bool) -> Vec<(String, f6
         };
         let truth = |id: &str| {
             let named = drawn.truth.iter().find(|known| known.id == id);
-            named.map_or(0.0, |own| if own.unit == "arcsec" { own.value / ARCSEC } else { own.value * 1e-3 })
+            named.map_or(0.0, |own| if own.unit == "arcsec" { own.value / ARCSEC_PER_RAD } else { own.value * 1e-3 })
         };
         identifiable.iter().map(|&j| ((found[j] - truth(&ids[j])).powi(2)) / linear.covariance[(j, j)]).collect()
     };
