@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use abbe::apply::history::HistoryOptions;
-use abbe::document::{StatedHistory, in_reading_units};
+use abbe::document::StatedHistory;
 use abbe::fleet::history;
 use abbe::fleet::options::Options;
 use abbe::fleet::store::{IfClaimed, Store};
@@ -22,8 +22,7 @@ impl From<FleetError> for Failed {
 }
 
 fn json(result: &impl Serialize) -> Result<String, Failed> {
-    let text = serde_json::to_string(result).and_then(in_reading_units);
-    text.map_err(|cause| Failed::new(format!("the result cannot be written: {cause}")))
+    serde_json::to_string(result).map_err(|cause| Failed::new(format!("the result cannot be written: {cause}")))
 }
 
 fn options(text: &str) -> Result<Options, Failed> {

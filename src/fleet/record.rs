@@ -51,7 +51,8 @@ pub struct Record {
     pub error: Option<ErrorRecord>,
     /// Instrument: `ballbar`, `r-test`, …
     pub instrument: Option<String>,
-    /// The final model, with the found effects if there was a trace; `null` if there is none.
+    /// The final model, with the found effects if there was a trace; `null` if there is none. Its keys end in `um` whatever
+    /// `reading_unit` is.
     pub model: Option<ModelResult>,
     /// Verdict of the trace; `null` without a trace.
     pub verdict: Option<TraceVerdict>,
