@@ -334,7 +334,7 @@ def linear_axis(runs, data):
         ["zero of the sensor alone", before["parameter_count"], figure(rms(before, "rms")), figure(rms(before, "heldout_rms")), figure(math.sqrt(nominal / readings))],
         ["`trace`", after["parameter_count"], figure(rms(after, "rms")), figure(rms(after, "heldout_rms")), figure(math.sqrt(squares / readings))],
     ]
-    iso = fit["positioning"][0]
+    iso = {one["id"]: one["value"] for one in fit["positioning"][0]["figures"]}
     published = f"The source prints M = 93.65 µm and A = 135.27 µm by ISO 230-2; `fit` gives M = {figure(iso['mean_range'])} µm and A = {figure(iso['accuracy'])} µm."
     remains = trace["remainder"]
     return "\n".join([

@@ -7,7 +7,7 @@
 //! - [`plausibility`]: consistency of readings and session;
 //! - [`monte_carlo`], [`propagation`]: propagation of distributions by Monte Carlo; [`repeated`]: Type A against Type B
 //!   uncertainty;
-//! - [`circular`]: ball-bar characteristics of ISO 230-4 and the diagnosis of circular tests;
+//! - [`figure`]: the figures that standards define; [`circular`]: ball-bar characteristics of ISO 230-4 and the diagnosis of circular tests;
 //! - [`linear`], [`identifiability`]: the linearised problem, and what its null space confounds;
 //! - [`directions`]: readings and residuals of an R-test by direction;
 //! - [`simulate`]: simulated readings; [`patterns`]: the pattern of each single error in a test; [`quantity`]: values
@@ -43,6 +43,7 @@
 pub mod circular;
 pub mod directions;
 pub mod error;
+pub mod figure;
 pub mod fit;
 pub mod heldout;
 pub mod identifiability;

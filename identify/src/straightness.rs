@@ -7,6 +7,8 @@ use abbe_model::session::{Session, Test};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::figure::{Figure, STRAIGHTNESS};
+use crate::numerics::range;
 use crate::positioning::{self, Position};
 
 /// Straightness of an axis in one direction across it (ISO 230-1).
@@ -20,10 +22,8 @@ pub struct StraightnessTest {
     pub channel: String,
     /// The positions, ascending.
     pub positions: Vec<StraightnessPosition>,
-    /// Straightness error about the line of least squares, µm.
-    pub least_squares_um: f64,
-    /// Straightness error about the line through the end points, µm.
-    pub end_points_um: f64,
+    /// The straightness error about either line.
+    pub figures: Vec<Figure>,
 }
 
 /// The straightness deviation at one position.
@@ -65,8 +65,9 @@ fn of_test(session: &Session, test: &Test, left_out: &[bool]) -> Vec<Straightnes
                 test: test.name.clone(),
                 axis: machine.axes[axis].name.clone(),
                 channel: channel.name.to_string(),
-                least_squares_um: range(&least_squares),
-                end_points_um: range(&end_points),
+                figures: (STRAIGHTNESS.iter().zip([&least_squares, &end_points]))
+                    .map(|(definition, deviations)| definition.with_value(range(deviations), "um"))
+                    .collect(),
                 positions: (points.iter().zip(least_squares).zip(end_points))
                     .map(|(([at_mm, mean_um], least_squares_um), end_points_um)| StraightnessPosition {
                         at_mm: *at_mm,
@@ -102,11 +103,6 @@ fn figures(points: &[[f64; 2]]) -> Option<[Vec<f64>; 2]> {
         points.iter().map(|point| point[1] - through[1] - slope * (point[0] - through[0])).collect()
     };
     Some([less(mean, sum(1) / sum(0)), less(*first, (last[1] - first[1]) / (last[0] - first[0]))])
-}
-
-fn range(deviations: &[f64]) -> f64 {
-    let greatest = deviations.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    greatest - deviations.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]

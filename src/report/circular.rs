@@ -4,10 +4,11 @@
 //! from there. The hysteresis is from the edition of 1996.
 
 use abbe::identify::circular::{CircularTest, Diagnosis};
+use abbe::identify::figure::{Definition, Figure, IN_BOTH_DIRECTIONS, IN_ONE_DIRECTION, find};
 
 use super::block::{Report, Text};
 use super::number::{micrometres, unit};
-use super::table::{Cell, Table, cells};
+use super::table::{Cell, Column, Table, cells, numbers, words};
 
 /// Tests that a terminal shows without `--all`.
 const MAX_TESTS: usize = 6;
@@ -42,8 +43,21 @@ fn heading(test: &CircularTest) -> String {
     format!("{}: circular path of {}{name}{bar}{radius}{feed}{arc}", test.test, test.axes)
 }
 
-fn figure(um: Option<f64>) -> Cell {
-    Cell::or_dash(um.map(|um| Cell::fixed(um, 2)))
+/// The edition whose names are printed.
+const STANDARD: &str = "ISO 230-4:2022";
+
+/// The name and the symbol of a figure, with the edition of an earlier one: `circular error (G)`.
+fn heading_of(definition: &Definition) -> String {
+    let Definition { symbol, name, standard, .. } = definition;
+    match standard.strip_prefix("ISO 230-4:") {
+        _ if symbol.is_empty() => name.to_string(),
+        Some(edition) if *standard != STANDARD => format!("{name} ({symbol}, edition of {edition})"),
+        _ => format!("{name} ({symbol})"),
+    }
+}
+
+fn cell(figures: &[Figure], definition: &Definition) -> Cell {
+    Cell::or_dash(find(figures, definition.id).map(|figure| Cell::fixed(figure.value, 2)))
 }
 
 /// The figures of both directions together and the largest fault, one row per test.
@@ -55,17 +69,16 @@ fn summary(tests: &[CircularTest]) -> Table {
             .diagnosis
             .first()
             .map_or(String::new(), |fault| format!("{} {}, {:.0} %", fault.fault, fault.axes, fault.share_percent));
-        cells![
-            &test.test,
-            arc,
-            figure(test.bidirectional_circular_deviation_um),
-            figure(test.mean_bidirectional_radial_deviation_um),
-            figure(test.hysteresis_um),
-            fault
-        ]
+        let mut cells = cells![&test.test, arc];
+        cells.extend(IN_BOTH_DIRECTIONS.iter().map(|definition| cell(&test.figures, definition)));
+        cells.push(fault.into());
+        cells
     });
-    let columns = ["test", "path of", ">G(b), µm", ">D, µm", ">H, µm", "largest fault"];
-    let count = if tests.iter().any(|test| !test.diagnosis.is_empty()) { columns.len() } else { columns.len() - 1 };
+    let figures = IN_BOTH_DIRECTIONS.iter().map(|definition| numbers(format!("{}, µm", definition.symbol)));
+    let columns = ["test", "path of"].map(words).into_iter().chain(figures).chain([words("largest fault")]);
+    let columns: Vec<Column> = columns.collect();
+    let has_faults = tests.iter().any(|test| !test.diagnosis.is_empty());
+    let count = columns.len() - usize::from(!has_faults);
     Table::new(columns, rows).first_columns(count)
 }
 
@@ -76,41 +89,24 @@ fn tables(test: &CircularTest) -> Vec<Table> {
     tables
 }
 
-/// One row per direction of the path.
+/// One row per direction of the path, with the figures of every standard of which there is one.
 fn directions(test: &CircularTest) -> Table {
+    let found = || test.directions.iter().flat_map(|direction| &direction.figures);
+    let is_shown = |definition: &&Definition| found().any(|own| own.definition.standard == definition.standard);
+    let shown: Vec<&Definition> = IN_ONE_DIRECTION.iter().filter(is_shown).collect();
     let rows = test.directions.iter().map(|direction| {
-        cells![
-            &direction.direction,
-            direction.runs.to_string(),
-            figure(Some(direction.circular_deviation_um)),
-            figure(Some(direction.radial_deviation_max_um)),
-            figure(Some(direction.radial_deviation_min_um)),
-            figure(direction.synchronous_error_motion_um),
-            figure(direction.asynchronous_error_motion_um),
-        ]
+        let mut cells = cells![&direction.direction, direction.runs.to_string()];
+        cells.extend(shown.iter().map(|definition| cell(&direction.figures, definition)));
+        cells
     });
-    let columns = [
-        "direction",
-        ">runs",
-        ">circular error (G), µm",
-        ">maximum radial error (F max), µm",
-        ">minimum radial error (F min), µm",
-        ">synchronous error motion, µm",
-        ">asynchronous error motion, µm",
-    ];
-    let is_rotary = test.directions.iter().any(|direction| direction.synchronous_error_motion_um.is_some());
-    Table::new(columns, rows).first_columns(if is_rotary { columns.len() } else { columns.len() - 2 })
+    let figures = shown.iter().map(|definition| numbers(format!("{}, µm", heading_of(definition))));
+    Table::new([words("direction"), numbers("runs")].into_iter().chain(figures), rows)
 }
 
 /// The figures of both directions together that the test has.
 fn both(test: &CircularTest) -> Table {
-    let figures = [
-        ("bidirectional circular error (G(b))", test.bidirectional_circular_deviation_um),
-        ("mean bidirectional radial error (D)", test.mean_bidirectional_radial_deviation_um),
-        ("circular hysteresis (H, edition of 1996)", test.hysteresis_um),
-    ];
-    let rows = figures.into_iter().filter_map(|(name, um)| Some(cells![name, Cell::fixed(um?, 2)]));
-    Table::new(["both directions", ">µm"], rows)
+    let row = |figure: &Figure| cells![heading_of(figure.definition), Cell::fixed(figure.value, 2)];
+    Table::new(["both directions", ">µm"], test.figures.iter().map(row))
 }
 
 /// One row per figure of a fault; the first row of a fault has its share.

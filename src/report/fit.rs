@@ -3,6 +3,7 @@
 use abbe::document::StatedFit;
 use abbe::identify::IdentifyError;
 use abbe::identify::circular::CircularTest;
+use abbe::identify::figure::{Definition, Figure};
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::{Estimate, FitMonteCarlo, FitResult, ModelResult, NextStep, Verdict};
@@ -197,6 +198,15 @@ impl Figures {
         figures.residual("residual", &result.model);
         figures.parameters("parameters", &result.model.parameters);
         result.circular.iter().for_each(|test| figures.circular(test));
+        for test in &result.positioning {
+            figures.standard(&format!("positioning {}", test.test), "", &test.read.figures);
+        }
+        for test in &result.diagonals {
+            figures.standard(&format!("diagonal {}", test.test), "", &test.read.figures);
+        }
+        for test in &result.straightness {
+            figures.standard(&format!("straightness {} {}", test.test, test.channel), "", &test.figures);
+        }
         figures.conformity(result.conformity.as_ref());
         figures.0
     }
@@ -248,27 +258,22 @@ impl Figures {
         }
     }
 
+    /// Figures of a standard, by their symbols or identifiers with what they are figures of.
+    fn standard(&mut self, section: &str, of: &str, figures: &[Figure]) {
+        for figure in figures {
+            let Definition { id, symbol, name, .. } = figure.definition;
+            let id = if symbol.is_empty() { (*id).to_string() } else { symbol.replace(' ', "") };
+            let u = figure.u.map_or("".into(), Cell::exact);
+            self.0.rows.push(cells![section, format!("{id}{of}"), *name, Cell::exact(figure.value), u, &figure.unit]);
+        }
+    }
+
     fn circular(&mut self, test: &CircularTest) {
         let section = format!("circle {}", test.test);
         for direction in &test.directions {
-            let of = |figure: &str| format!("{figure}({}{})", test.axes, direction.direction);
-            for (id, meaning, value) in [
-                (of("G"), "circular deviation", direction.circular_deviation_um),
-                (of("Fmax"), "radial deviation, greatest", direction.radial_deviation_max_um),
-                (of("Fmin"), "radial deviation, least", direction.radial_deviation_min_um),
-            ] {
-                self.figure(&section, &id, meaning, value, "um");
-            }
+            self.standard(&section, &format!("({}{})", test.axes, direction.direction), &direction.figures);
         }
-        for (id, meaning, value) in [
-            ("G(b)", "bidirectional circular deviation", test.bidirectional_circular_deviation_um),
-            ("D", "mean bidirectional radial deviation", test.mean_bidirectional_radial_deviation_um),
-            ("H", "circular hysteresis", test.hysteresis_um),
-        ] {
-            if let Some(value) = value {
-                self.figure(&section, id, meaning, value, "um");
-            }
-        }
+        self.standard(&section, "", &test.figures);
         for fault in &test.diagnosis {
             let meaning = format!("{} of {}, {:.1} % of the path", fault.fault, fault.axes, fault.share_percent);
             self.0.rows.extend(fault.values.iter().map(|value| {

@@ -1,29 +1,18 @@
 //! Figures of ISO 230-2 and ISO 230-6: the table and the plot of an axis, and of a diagonal.
 
+use abbe::identify::figure::{Figure, OF_DIAGONALS, POSITIONING, find};
 use abbe::identify::positioning::diagonal::{DiagonalKind, DiagonalTest, LargestOfDiagonals};
-use abbe::identify::positioning::{Approach, FigureUncertainties, Figures, Position, PositioningTest};
+use abbe::identify::positioning::{Approach, Contributions, Deviations, Position, PositioningTest};
 
 use super::block::{Report, Text};
 use super::figure::lines::{Axis, Lines, Mark, Series};
 use super::figure::scale::{Scale, span};
-use super::figure::{Chart, Figure};
+use super::figure::{self, Chart};
 use super::number::unit;
 use super::table::{Cell, Table, cells, numbers, words};
 
 /// Positions that a terminal shows without `--all`.
 const MAX_ROWS: usize = 12;
-
-/// What has been read at positions of a way: an axis or a diagonal.
-struct Way<'t> {
-    test: &'t str,
-    /// `X`, `XYZ PPP`.
-    name: String,
-    unit: &'t str,
-    position_unit: &'t str,
-    positions: &'t [Position],
-    figures: &'t Figures,
-    uncertainty: Option<&'t FigureUncertainties>,
-}
 
 /// The section of the figures of every test, if there is one.
 pub fn section(report: &mut Report, tests: &[PositioningTest]) {
@@ -31,20 +20,11 @@ pub fn section(report: &mut Report, tests: &[PositioningTest]) {
         return;
     }
     report.section("Positioning figures");
-    for test in tests {
-        let way = Way {
-            test: &test.test,
-            name: test.axis.clone(),
-            unit: &test.unit,
-            position_unit: &test.position_unit,
-            positions: &test.positions,
-            figures: &test.figures,
-            uncertainty: test.uncertainty.as_ref(),
-        };
-        report.key(figures(&way).titled(format!("{}: positioning of {} (ISO 230-2)", test.test, test.axis)));
-        detail(report, &way, format!("positioning-{}", test.test));
+    for PositioningTest { test, axis, read } in tests {
+        report.key(figures(read).titled(format!("{test}: positioning of {axis} (ISO 230-2)")));
+        detail(report, read, axis, format!("positioning-{test}"), format!("{test}: deviation of {axis}"));
     }
-    notes(report, tests.iter().any(|test| test.uncertainty.is_some()));
+    notes(report, tests.iter().any(|test| test.read.uncertainty.is_some()));
 }
 
 /// The section of the figures of every diagonal, if there is one.
@@ -54,20 +34,12 @@ pub fn diagonals(report: &mut Report, tests: &[DiagonalTest], largest: &[Largest
     }
     report.section("Figures of diagonals");
     report.key(overview(tests, largest));
-    for test in tests {
-        let way = Way {
-            test: &test.test,
-            name: named(test),
-            unit: &test.unit,
-            position_unit: "mm",
-            positions: &test.positions,
-            figures: &test.figures,
-            uncertainty: test.uncertainty.as_ref(),
-        };
-        report.detail(figures(&way).titled(format!("{}: {}", test.test, way.name)));
-        detail(report, &way, format!("diagonal-{}", test.test));
+    for one in tests {
+        let (test, read, name) = (&one.test, &one.read, named(one));
+        report.detail(figures(read).titled(format!("{test}: {name}")));
+        detail(report, read, "distance", format!("diagonal-{test}"), format!("{test}: deviation of {name}"));
     }
-    notes(report, tests.iter().any(|test| test.uncertainty.is_some()));
+    notes(report, tests.iter().any(|test| test.read.uncertainty.is_some()));
 }
 
 /// A diagonal in words: `body diagonal XYZ PPP`.
@@ -83,49 +55,59 @@ fn kind(kind: DiagonalKind) -> &'static str {
     }
 }
 
-/// The figures of every diagonal, and the largest; E, R, B and M with their expanded uncertainties, if a session states
-/// contributors.
+/// The figures of a diagonal in the table of all.
+const OVERVIEW: [&str; 6] =
+    ["systematic", "systematic_forward", "systematic_backward", "repeatability", "reversal", "mean_range"];
+
+/// The figures of every diagonal, and the largest; beside those of both directions the expanded uncertainty, if a session
+/// states contributors.
 fn overview(tests: &[DiagonalTest], largest: &[LargestOfDiagonals]) -> Table {
-    let of = |value: Option<f64>| Cell::or_dash(value.map(|value| Cell::fixed(value, 2)));
-    let is_stated = tests.iter().any(|test| test.uncertainty.is_some());
-    let with = |value: Option<f64>, u: Option<f64>| {
-        let u = is_stated.then(|| of(u));
-        std::iter::once(of(value)).chain(u)
+    let is_stated = tests.iter().any(|test| test.read.uncertainty.is_some());
+    let has_u = |id: &str| is_stated && OF_DIAGONALS.contains(&id);
+    let figures_of = |figures: &[Figure]| -> Vec<Cell> {
+        let cells = OVERVIEW.iter().flat_map(|id| {
+            let [value, u] = value_and_expanded_u(figures, id);
+            std::iter::once(value).chain(has_u(id).then_some(u))
+        });
+        cells.collect()
     };
-    let row = |test: &DiagonalTest| {
-        let (found, u) = (test.figures, test.uncertainty.map(|uncertainty| uncertainty.figures).unwrap_or_default());
+    let rows = tests.iter().map(|test| {
         let mut cells = cells![&test.test, named(test), Cell::fixed(test.length_mm, 3)];
-        cells.extend(with(found.systematic, u.systematic));
-        cells.extend([found.systematic_forward, found.systematic_backward].map(of));
-        cells.extend(with(found.repeatability, u.repeatability));
-        cells.extend(with(found.reversal, u.reversal));
-        cells.extend(with(found.mean_range, u.mean_range));
+        cells.extend(figures_of(&test.read.figures));
         cells
-    };
+    });
     let last = largest.iter().map(|one| {
         let step = if one.in_turn { " in steps" } else { "" };
         let words = format!("largest of {} {} diagonals{step}", one.tests.len(), kind(one.kind));
         let mut cells = cells!["", words, Cell::or_dash(None)];
-        cells.extend(with(one.systematic, None));
-        cells.extend([None, None].map(of));
-        cells.extend([one.repeatability, one.reversal, one.mean_range].into_iter().flat_map(|value| with(value, None)));
+        cells.extend(figures_of(&one.figures));
         cells
     });
-    let e = format!("E, {}", unit(&tests[0].unit));
-    let named = |name: &str| [Some(name.to_string()), is_stated.then(|| "U".to_string())].into_iter().flatten();
     let mut columns = vec![words("test"), words("diagonal"), numbers("length, mm")];
-    columns.extend(
-        named(&e).chain(["E↑".into(), "E↓".into()]).chain(["R", "B", "M"].into_iter().flat_map(named)).map(numbers),
-    );
-    Table::new(columns, tests.iter().map(row).chain(last)).titled("Diagonals (ISO 230-6)")
+    for definition in OVERVIEW.iter().filter_map(|id| POSITIONING.iter().find(|definition| definition.id == *id)) {
+        let is_first = definition.id == OVERVIEW[0];
+        let in_unit = if is_first { format!(", {}", unit(&tests[0].read.unit)) } else { String::new() };
+        columns.push(numbers(format!("{}{in_unit}", definition.symbol)));
+        columns.extend(has_u(definition.id).then(|| numbers("U")));
+    }
+    Table::new(columns, rows.chain(last)).titled("Diagonals (ISO 230-6)")
 }
 
-fn detail(report: &mut Report, way: &Way<'_>, name: String) {
-    if let Some(uncertainty) = way.uncertainty {
-        report.detail(contributors(uncertainty, way.unit));
+/// A figure and its expanded uncertainty, k = 2.
+fn value_and_expanded_u(figures: &[Figure], id: &str) -> [Cell; 2] {
+    let found = find(figures, id);
+    let [value, u] = [found.map(|figure| figure.value), found.and_then(|figure| figure.u).map(|u| 2.0 * u)];
+    [value, u].map(|number| Cell::or_dash(number.map(|number| Cell::fixed(number, 2))))
+}
+
+/// The contributors to the uncertainty, the deviations at every position and their plot; `along` is the axis of positions.
+fn detail(report: &mut Report, read: &Deviations, along: &str, file: String, title: String) {
+    if let Some(uncertainty) = &read.uncertainty {
+        report.detail(contributors(uncertainty, &read.unit));
     }
-    report.detail(positions(way).folded(MAX_ROWS));
-    report.figures([plot(way, name)]);
+    report.detail(positions(read, along).folded(MAX_ROWS));
+    let caption = "Means and two standard deviations of the approaches in either direction.";
+    report.figures([figure::Figure::new(file, title, caption, plot(read, along))]);
 }
 
 fn notes(report: &mut Report, is_uncertainty_stated: bool) {
@@ -145,37 +127,27 @@ fn notes(report: &mut Report, is_uncertainty_stated: bool) {
 
 /// The figures, with the symbols of the standard: bidirectional, in positive, in negative direction; each with its
 /// expanded uncertainty, if the session states contributors.
-fn figures(way: &Way<'_>) -> Table {
-    let rows = |of: &Figures| {
-        [
-            ("accuracy A", [of.accuracy, of.accuracy_forward, of.accuracy_backward]),
-            ("repeatability R", [of.repeatability, of.repeatability_forward, of.repeatability_backward]),
-            ("systematic deviation E", [of.systematic, of.systematic_forward, of.systematic_backward]),
-            ("mean bidirectional deviation M", [of.mean_range, None, None]),
-            ("reversal value B", [of.reversal, None, None]),
-            ("mean reversal value", [of.mean_reversal, None, None]),
-        ]
-    };
-    let cell = |value: Option<f64>| Cell::or_dash(value.map(|value| Cell::fixed(value, 2)));
-    let heading = format!("both, {}", unit(way.unit));
-    let names = [heading.as_str(), "↑", "↓"];
-    let Some(uncertainty) = way.uncertainty else {
-        let rows = rows(way.figures)
-            .map(|(name, [both, forward, backward])| cells![name, cell(both), cell(forward), cell(backward)]);
-        return Table::new([words("")].into_iter().chain(names.map(numbers)), rows);
-    };
-    let expanded = rows(&uncertainty.figures);
-    let rows = rows(way.figures).into_iter().zip(expanded).map(|((name, values), (_, u))| {
-        let [both, forward, backward] = values.map(cell);
-        let [u_both, u_forward, u_backward] = u.map(cell);
-        cells![name, both, u_both, forward, u_forward, backward, u_backward]
+fn figures(read: &Deviations) -> Table {
+    let with_u = |[value, u]: [Cell; 2]| std::iter::once(value).chain(read.uncertainty.is_some().then_some(u));
+    let rows = POSITIONING.chunk_by(|a, b| a.name == b.name).map(|group| {
+        let label = format!("{} {}", group[0].name, group[0].symbol);
+        let mut cells = cells![label.trim_end()];
+        for direction in 0..3 {
+            let id = group.get(direction).map_or("", |definition| definition.id);
+            cells.extend(with_u(value_and_expanded_u(&read.figures, id)));
+        }
+        cells
     });
-    let columns = names.into_iter().flat_map(|name| [numbers(name), numbers("U")]);
-    Table::new([words("")].into_iter().chain(columns), rows)
+    let heading = format!("both, {}", unit(&read.unit));
+    let mut columns = vec![words("")];
+    for name in [heading.as_str(), "↑", "↓"] {
+        columns.extend(with_u([name.into(), "U".into()]).map(|heading| numbers(heading.to_string())));
+    }
+    Table::new(columns, rows)
 }
 
 /// The contributors to the uncertainty.
-fn contributors(of: &FigureUncertainties, in_unit: &str) -> Table {
+fn contributors(of: &Contributions, in_unit: &str) -> Table {
     let rows = [
         ("device", of.device),
         ("misalignment of the beam", of.misalignment),
@@ -190,11 +162,11 @@ fn contributors(of: &FigureUncertainties, in_unit: &str) -> Table {
 }
 
 /// Mean, standard deviation and reversal value at every position.
-fn positions(test: &Way<'_>) -> Table {
+fn positions(read: &Deviations, along: &str) -> Table {
     let mean = |approach: Option<Approach>| Cell::or_dash(approach.map(|one| Cell::fixed(one.mean, 3)));
     let deviation =
         |approach: Option<Approach>| Cell::or_dash(approach.and_then(|one| one.deviation).map(|s| Cell::fixed(s, 3)));
-    let rows = test.positions.iter().map(|position| {
+    let rows = read.positions.iter().map(|position| {
         let reversal = position.forward.zip(position.backward).map(|(forward, backward)| forward.mean - backward.mean);
         cells![
             Cell::fixed(position.at, 4),
@@ -205,24 +177,19 @@ fn positions(test: &Way<'_>) -> Table {
             Cell::or_dash(reversal.map(|reversal| Cell::fixed(reversal, 3))),
         ]
     });
-    let position = format!("{}, {}", axis(test), unit(test.position_unit));
+    let position = format!("{along}, {}", unit(&read.position_unit));
     let columns = [position.as_str(), "mean ↑", "s ↑", "mean ↓", "s ↓", "B"].map(numbers);
-    Table::new(columns, rows).titled(format!("Deviations in {}", unit(test.unit)))
-}
-
-/// The name of the axis of positions.
-fn axis<'w>(way: &'w Way<'_>) -> &'w str {
-    if way.name.contains(' ') { "distance" } else { &way.name }
+    Table::new(columns, rows).titled(format!("Deviations in {}", unit(&read.unit)))
 }
 
 /// Means and ±2s of both directions over the positions.
-fn plot(test: &Way<'_>, name: String) -> Figure {
+fn plot(read: &Deviations, along: &str) -> Chart {
     let points = |direction: usize, deviations: f64| -> Vec<(f64, f64)> {
         let at = |position: &Position| {
             let one = [position.forward, position.backward][direction]?;
             Some((position.at, one.mean + deviations * one.deviation.unwrap_or(0.0)))
         };
-        test.positions.iter().filter_map(at).collect()
+        read.positions.iter().filter_map(at).collect()
     };
     let series: Vec<Series> = ["forward", "backward"]
         .into_iter()
@@ -233,14 +200,8 @@ fn plot(test: &Way<'_>, name: String) -> Figure {
             })
         })
         .collect();
-    let x = Scale::of_axis(span(test.positions.iter().map(|position| position.at)), test.position_unit == "deg");
+    let x = Scale::of_axis(span(read.positions.iter().map(|position| position.at)), read.position_unit == "deg");
     let y = Scale::with_zero(span(series.iter().flat_map(|series| series.points.iter().map(|point| point.1))), 6);
-    let x = Axis::new(axis(test), if test.position_unit == "deg" { "deg" } else { "mm" }, x);
-    let lines = Lines::new(x, Axis::new("deviation", if test.unit == "um" { "um" } else { "arcsec" }, y), series);
-    Figure::new(
-        name,
-        format!("{}: deviation of {}", test.test, test.name),
-        "Means and two standard deviations of the approaches in either direction.",
-        Chart::Lines(lines),
-    )
+    let x = Axis::new(along, &read.position_unit, x);
+    Chart::Lines(Lines::new(x, Axis::new("deviation", &read.unit, y), series))
 }

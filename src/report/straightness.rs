@@ -1,6 +1,7 @@
 //! Figures of straightness of ISO 230-1.
 
-use abbe::identify::straightness::StraightnessTest;
+use abbe::identify::figure::STRAIGHTNESS;
+use abbe::identify::straightness::{StraightnessPosition, StraightnessTest};
 
 use super::block::{Report, Text};
 use super::figure::lines::{Axis, Lines, Mark, Series};
@@ -15,11 +16,12 @@ pub fn section(report: &mut Report, tests: &[StraightnessTest]) {
     }
     report.section("Straightness figures");
     let row = |test: &StraightnessTest| {
-        let figure = |um: f64| Cell::fixed(um, 2);
-        cells![&test.test, &test.axis, &test.channel, figure(test.least_squares_um), figure(test.end_points_um)]
+        let mut cells = cells![&test.test, &test.axis, &test.channel];
+        cells.extend(test.figures.iter().map(|figure| Cell::fixed(figure.value, 2)));
+        cells
     };
-    let columns =
-        [words("test"), words("axis"), words("direction"), numbers("least squares, µm"), numbers("end points, µm")];
+    let figures = STRAIGHTNESS.iter().map(|definition| numbers(format!("{}, µm", definition.name)));
+    let columns = ["test", "axis", "direction"].map(words).into_iter().chain(figures);
     report.key(Table::new(columns, tests.iter().map(row)).titled("Straightness error (ISO 230-1)"));
     report.figures(tests.iter().map(plot));
     report.page(Text::Note(
@@ -31,7 +33,7 @@ pub fn section(report: &mut Report, tests: &[StraightnessTest]) {
 
 /// The deviations from both lines over the positions.
 fn plot(test: &StraightnessTest) -> Figure {
-    let points = |of: fn(&abbe::identify::straightness::StraightnessPosition) -> f64| -> Vec<(f64, f64)> {
+    let points = |of: fn(&StraightnessPosition) -> f64| -> Vec<(f64, f64)> {
         test.positions.iter().map(|position| (position.at_mm, of(position))).collect()
     };
     let series = vec![

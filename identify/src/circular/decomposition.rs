@@ -7,9 +7,10 @@
 use abbe_model::chain::Machine;
 
 use super::faults::{Fault, cyclic, cyclic_by_direction, is_third_order, set_up, spike, standard, third_order};
-use super::path::{MovingAxes, Path, length};
+use super::path::{MovingAxes, Path};
 use super::rows::{Row, rows};
 use crate::noise::enlargement_of_mean;
+use crate::numerics::range;
 use crate::numerics::regression::Regression;
 use crate::numerics::tails::chi_square_tail;
 
@@ -155,7 +156,7 @@ impl Decomposition {
         let pitches = |axis: usize| {
             let q: Vec<f64> = self.rows.iter().map(|row| row.q[axis]).collect();
             let steps = (1..q.len()).filter(|i| self.rows[*i].follows).map(|i| (q[i] - q[i - 1]).abs());
-            let (travel, spacing) = (length(&q), steps.fold(0.0, f64::max));
+            let (travel, spacing) = (range(&q), steps.fold(0.0, f64::max));
             // From four periods over the travel to 2.5 readings per period.
             let (slowest, fastest) = (4.0, travel / (2.5 * spacing.max(1e-3)));
             let tried = (((fastest - slowest) * 4.0).max(0.0) as usize).min(1000);

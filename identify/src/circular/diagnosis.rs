@@ -22,10 +22,11 @@
 use abbe_model::chain::Machine;
 
 use super::decomposition::Decomposition;
-use super::faults::{Figure, is_third_order};
-use super::path::{Path, length};
+use super::faults::{FaultFigure, is_third_order};
+use super::path::Path;
 use super::results::{CircularTest, Diagnosis};
 use crate::noise::outliers;
+use crate::numerics::range;
 use crate::results::Estimate;
 
 /// The outliers of a circle: single readings with a large residual of the diagnosis; `None` if there is no diagnosis.
@@ -56,11 +57,11 @@ fn report(model: &Decomposition, sigma_mm: f64, result: &mut CircularTest) {
     for (k, fault) in model.faults.iter().enumerate() {
         let first = model.place(k);
         let beta = &regression.beta[first..first + fault.columns.len()];
-        let value = |(id, figure): &(String, Figure)| {
+        let value = |(id, figure): &(String, FaultFigure)| {
             let (factors, unit) = match figure {
-                Figure::Searched(value, unit) => return Estimate::new(id, *value, 0.0, *unit),
-                Figure::Sum(factors, unit) => (factors.clone(), *unit),
-                Figure::Amplitude(cos) => {
+                FaultFigure::Searched(value, unit) => return Estimate::new(id, *value, 0.0, *unit),
+                FaultFigure::Sum(factors, unit) => (factors.clone(), *unit),
+                FaultFigure::Amplitude(cos) => {
                     let amplitude = beta[*cos].hypot(beta[cos + 1]);
                     let along = |j: usize| if j == *cos || j == cos + 1 { 1e3 * beta[j] / amplitude } else { 0.0 };
                     ((0..beta.len()).map(along).collect(), "um")
@@ -79,7 +80,7 @@ fn report(model: &Decomposition, sigma_mm: f64, result: &mut CircularTest) {
             fault: fault.fault.to_string(),
             axes: fault.axes.clone(),
             values: fault.figures.iter().map(value).map(meant).collect(),
-            circularity_um: length(&(0..model.rows.len()).map(own).collect::<Vec<f64>>()) * 1e3,
+            circularity_um: range(&(0..model.rows.len()).map(own).collect::<Vec<f64>>()) * 1e3,
             share_percent: 0.0,
         });
     }

@@ -25,7 +25,7 @@ use super::path::Path;
 use super::rows::Row;
 
 /// A value of a fault.
-pub(super) enum Figure {
+pub(super) enum FaultFigure {
     /// The sum of its coefficients times these factors, and the unit of the sum.
     Sum(Vec<f64>, &'static str),
     /// The amplitude of a cosine and a sine, by the column of the cosine.
@@ -40,7 +40,7 @@ pub(super) struct Fault {
     pub axes: String,
     pub columns: Vec<Vec<f64>>,
     /// The values, by name.
-    pub figures: Vec<(String, Figure)>,
+    pub figures: Vec<(String, FaultFigure)>,
 }
 
 /// A column of the regression, mm for a coefficient of 1 mm.
@@ -52,14 +52,14 @@ impl Fault {
         Fault { fault, axes: axes.to_string(), columns, figures: Vec::new() }
     }
 
-    fn with(mut self, name: impl Into<String>, figure: Figure) -> Fault {
+    fn with(mut self, name: impl Into<String>, figure: FaultFigure) -> Fault {
         self.figures.push((name.into(), figure));
         self
     }
 
     /// With a sum of its coefficients, mm, times these factors.
     fn sum(self, name: impl Into<String>, factors: &[f64], unit: &'static str) -> Fault {
-        self.with(name, Figure::Sum(factors.to_vec(), unit))
+        self.with(name, FaultFigure::Sum(factors.to_vec(), unit))
     }
 
     /// With a value at the positive and one at the negative end of the travel, µm for a coefficient of 1 mm.
@@ -158,7 +158,7 @@ pub(super) fn spike(rows: &[Row], axis: usize, name: &str, width: f64) -> Fault 
     };
     Fault::new("reversal spike", name, rows, &[&after(1.0), &after(-1.0)])
         .ends([1e3, 0.0], [0.0, 1e3])
-        .with("width", Figure::Searched(width.to_degrees(), "deg"))
+        .with("width", FaultFigure::Searched(width.to_degrees(), "deg"))
 }
 
 /// A cyclic error of an axis with a pitch, which is the same in both directions.
@@ -175,10 +175,10 @@ pub(super) fn cyclic_by_direction(rows: &[Row], axis: usize, name: &str, pitch_m
     let mut fault = Fault { columns: Vec::new(), ..both };
     for (direction, name) in [(1.0, "forward"), (-1.0, "backward")] {
         if rows.iter().any(|row| row.d[axis] == direction) {
-            fault.figures.push((name.to_string(), Figure::Amplitude(fault.columns.len())));
+            fault.figures.push((name.to_string(), FaultFigure::Amplitude(fault.columns.len())));
             let part = |(value, row): (&f64, &Row)| if row.d[axis] == direction { *value } else { 0.0 };
             fault.columns.extend(both.columns.iter().map(|column| column.iter().zip(rows).map(part).collect()));
         }
     }
-    fault.with("pitch", Figure::Searched(pitch_mm, "mm"))
+    fault.with("pitch", FaultFigure::Searched(pitch_mm, "mm"))
 }

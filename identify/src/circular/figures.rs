@@ -19,10 +19,12 @@ use abbe_model::session::placing::{axis_line, balls};
 use nalgebra::Vector3;
 
 use super::names;
-use super::path::{MovingAxes, Path, length, range};
+use super::path::{MovingAxes, Path};
 use super::polar::{Centre, PolarPath, mean, width_mm};
 use super::results::{CircularTest, DirectionFigures};
 use super::set_up::{FigureUncertainties, SetUp};
+use crate::figure::{Definition, Figure, IN_BOTH_DIRECTIONS, IN_ONE_DIRECTION};
+use crate::numerics::{ends, range};
 
 /// The characteristics of a path.
 pub(super) fn figures(machine: &Arc<Machine>, test: &Test, path: &Path) -> CircularTest {
@@ -70,25 +72,41 @@ pub(super) fn figures(machine: &Arc<Machine>, test: &Test, path: &Path) -> Circu
         .filter_map(|(trace, (direction, sign))| {
             let (trace, runs) = trace.as_ref()?;
             let (_, deviations_mm) = radial_deviations_mm(path, trace);
-            let (least, most) = range(&deviations_mm);
+            let [least, most] = ends(&deviations_mm);
             // The circle through both directions may be nearer to the minimum zone of one than its own.
             let about_both = both.as_ref().map_or(f64::INFINITY, |(_, _, deviations_mm, there)| {
                 let (one, other) = deviations_mm.split_at(*there);
-                length(if sign > 0.0 { one } else { other })
+                range(if sign > 0.0 { one } else { other })
             });
-            Some(DirectionFigures {
-                set_up_u: FigureUncertainties::of(path, trace, &deviations_mm, &set_up),
-                direction: direction.to_string(),
-                runs: *runs,
-                circular_deviation_um: (most - least).min(about_both) * 1e3,
-                radial_deviation_max_um: most * 1e3,
-                radial_deviation_min_um: least * 1e3,
-                synchronous_error_motion_um: is_error_motion.then_some((most - least) * 1e3),
-                asynchronous_error_motion_um: width_mm(path, sign).filter(|_| is_error_motion).map(|width| width * 1e3),
-            })
+            let u = FigureUncertainties::of(path, trace, &deviations_mm, &set_up);
+            let width_mm = width_mm(path, sign).filter(|_| is_error_motion);
+            let values = [
+                Some(((most - least).min(about_both) * 1e3, u.range_um)),
+                Some((most * 1e3, u.max_um)),
+                Some((least * 1e3, u.min_um)),
+                is_error_motion.then_some(((most - least) * 1e3, u.range_um)),
+                // Differences between runs, as those between directions, do not contain the set-up.
+                width_mm.map(|width| (width * 1e3, 0.0)),
+            ];
+            let figures = with_values(&IN_ONE_DIRECTION, values);
+            Some(DirectionFigures { direction: direction.to_string(), runs: *runs, figures })
         })
         .collect();
-    let mut result = CircularTest {
+    let mut figures = Vec::new();
+    if let ([Some((there, _)), Some((back, _))], Some((both, centre, deviations_mm, _))) = (&traces, &both) {
+        let [least, most] = ends(deviations_mm);
+        let u = FigureUncertainties::of(path, both, deviations_mm, &set_up);
+        let differences = there.0.iter().filter_map(|p| Some((p.deviation_mm - back.at(p.angle)?).abs()));
+        let values = [
+            Some(((most - least) * 1e3, u.range_um)),
+            Some((centre.radius_mm * 1e3, u.mean_um)),
+            differences.reduce(f64::max).map(|most| (most * 1e3, 0.0)),
+        ];
+        figures = with_values(&IN_BOTH_DIRECTIONS, values);
+    } else {
+        not_identifiable.push("one direction only: G(b), D and hysteresis require both directions".into());
+    }
+    CircularTest {
         test: test.name.clone(),
         axes,
         iso_10791_6: names::iso_10791_6(machine, test).map(str::to_string),
@@ -97,26 +115,20 @@ pub(super) fn figures(machine: &Arc<Machine>, test: &Test, path: &Path) -> Circu
         feed_mm_min: path.feed_mm_s.map(|feed| feed * 60.0),
         arc_deg: arc.to_degrees(),
         directions,
-        bidirectional_circular_deviation_um: None,
-        mean_bidirectional_radial_deviation_um: None,
-        hysteresis_um: None,
+        figures,
         diagnosis: Vec::new(),
         diagnosis_rms_um: None,
         not_identifiable,
-        set_up_u: FigureUncertainties::default(),
-    };
-    match (&traces, &both) {
-        ([Some((there, _)), Some((back, _))], Some((both, centre, deviations_mm, _))) => {
-            let (least, most) = range(deviations_mm);
-            result.set_up_u = FigureUncertainties::of(path, both, deviations_mm, &set_up);
-            result.bidirectional_circular_deviation_um = Some((most - least) * 1e3);
-            result.mean_bidirectional_radial_deviation_um = Some(centre.radius_mm * 1e3);
-            let differences = there.0.iter().filter_map(|p| Some((p.deviation_mm - back.at(p.angle)?).abs()));
-            result.hysteresis_um = differences.reduce(f64::max).map(|most| most * 1e3);
-        }
-        _ => result.not_identifiable.push("one direction only: G(b), D and hysteresis require both directions".into()),
     }
-    result
+}
+
+/// The figures of a table that have a value, µm, each with its standard uncertainty by the set-up.
+fn with_values<const N: usize>(table: &'static [Definition; N], values: [Option<(f64, f64)>; N]) -> Vec<Figure> {
+    let figure = |(definition, found): (&'static Definition, Option<(f64, f64)>)| {
+        let (value, set_up_u) = found?;
+        Some(Figure { set_up_u, ..definition.with_value(value, "um") })
+    };
+    table.iter().zip(values).filter_map(figure).collect()
 }
 
 /// The centre of a path, and the radial deviations about it, mm.
@@ -131,7 +143,7 @@ fn linear_axes_rest(machine: &Machine, test: &Test) -> bool {
     const REST_MM: f64 = 1e-3;
     let Some(readings) = &test.readings else { return false };
     let mut linear = machine.axes.iter().zip(&readings.positions).filter(|(axis, _)| axis.kind == AxisKind::Linear);
-    linear.all(|(_, column)| length(column) <= REST_MM)
+    linear.all(|(_, column)| range(column) <= REST_MM)
 }
 
 /// Least share of the radial direction in that of the bar: as for the bar in the plane of a circle.

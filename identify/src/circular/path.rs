@@ -10,7 +10,7 @@ use abbe_model::driver::DriverSample;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::Test;
 
-use crate::numerics::circle;
+use crate::numerics::{circle, range};
 
 /// Least number of readings of a run.
 const MIN_READINGS: usize = 8;
@@ -97,12 +97,7 @@ impl Path {
             moves,
             runs,
             angle,
-            deviation_mm: readings
-                .observed
-                .iter()
-                .zip(&nominal_mm)
-                .map(|(observed, nominal)| observed - nominal)
-                .collect(),
+            deviation_mm: readings.observed.iter().zip(&nominal_mm).map(|(read, nominal)| read - nominal).collect(),
             nominal_mm,
             left_out: vec![false; readings.rows()],
             samples,
@@ -117,26 +112,15 @@ impl Path {
 
     /// Arc of the longest run, rad, at most one full turn.
     pub fn arc(&self) -> f64 {
-        self.runs.iter().map(|run| length(&self.angle[run.rows.clone()])).fold(0.0, f64::max).min(TAU)
+        self.runs.iter().map(|run| range(&self.angle[run.rows.clone()])).fold(0.0, f64::max).min(TAU)
     }
-}
-
-/// The least and the greatest value.
-pub(super) fn range(values: &[f64]) -> (f64, f64) {
-    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), x| (least.min(*x), most.max(*x)))
-}
-
-/// The length of the range of some values.
-pub(super) fn length(values: &[f64]) -> f64 {
-    let (least, most) = range(values);
-    most - least
 }
 
 /// The moving axes of a test, if they make a circle.
 fn moves(machine: &Machine, positions: &[Vec<f64>], nominal_mm: &[f64]) -> Option<MovingAxes> {
     let moving = |kind: AxisKind, least: f64| -> Vec<usize> {
         (0..machine.axes.len())
-            .filter(|&axis| machine.axes[axis].kind == kind && length(&positions[axis]) > least)
+            .filter(|&axis| machine.axes[axis].kind == kind && range(&positions[axis]) > least)
             .collect()
     };
     let (linear, rotary) = (moving(AxisKind::Linear, 1e-3), moving(AxisKind::Rotary, 1e-4));

@@ -4,8 +4,9 @@ use std::f64::consts::{PI, TAU};
 
 use num_dual::DualNum;
 
-use super::path::{MovingAxes, Path, length};
+use super::path::{MovingAxes, Path};
 use crate::numerics::circle::{self, Circle};
+use crate::numerics::range;
 
 /// A reading, or the mean of the readings of several runs at one angle.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +53,7 @@ pub(super) fn width_mm(path: &Path, direction: f64) -> Option<f64> {
     let (first, others) = runs.split_first().filter(|(_, others)| !others.is_empty())?;
     let widths = first.0.iter().map(|p| {
         let deviations: Vec<f64> = others.iter().filter_map(|run| run.at(p.angle)).chain([p.deviation_mm]).collect();
-        length(&deviations)
+        range(&deviations)
     });
     widths.reduce(f64::max)
 }

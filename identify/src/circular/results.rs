@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::set_up::FigureUncertainties;
+use crate::figure::Figure;
 use crate::results::Estimate;
 
 /// Ball-bar figures of a circular test (ISO 230-4).
@@ -30,15 +30,8 @@ pub struct CircularTest {
     pub arc_deg: f64,
     /// Figures of each direction of travel.
     pub directions: Vec<DirectionFigures>,
-    /// Bidirectional circular deviation G(b), µm: radial range of both paths about their common least-squares circle.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bidirectional_circular_deviation_um: Option<f64>,
-    /// Mean bidirectional radial deviation D, µm: radius of that circle less the nominal one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mean_bidirectional_radial_deviation_um: Option<f64>,
-    /// Circular hysteresis H, µm: the greatest difference of radius between the two directions at one angle.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub hysteresis_um: Option<f64>,
+    /// Figures of both directions together: G(b), D, H.
+    pub figures: Vec<Figure>,
     /// Contributions of classical faults to the path, the largest first; absent for a rotary axis.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub diagnosis: Vec<Diagnosis>,
@@ -48,9 +41,6 @@ pub struct CircularTest {
     /// What this test does not identify, in words.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub not_identifiable: Vec<String>,
-    /// Uncertainties of the figures of both directions by the set-up.
-    #[serde(skip)]
-    pub(crate) set_up_u: FigureUncertainties,
 }
 
 /// Figures of the mean path of the runs in one direction.
@@ -61,24 +51,9 @@ pub struct DirectionFigures {
     pub direction: String,
     /// Number of runs.
     pub runs: usize,
-    /// Circular deviation G, µm: radial range about the least-squares circle.
-    pub circular_deviation_um: f64,
-    /// Largest radial deviation F, µm: from the nominal radius, about the centre of the least-squares circle.
-    pub radial_deviation_max_um: f64,
-    /// Smallest radial deviation F, µm.
-    pub radial_deviation_min_um: f64,
-    /// Synchronous error motion of a rotary axis, µm (ISO 230-7): radial range of the mean of the runs without its
-    /// first harmonic. Absent unless a rotary axis makes a full turn with the linear axes at rest and the bar radial to
-    /// the axis.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub synchronous_error_motion_um: Option<f64>,
-    /// Asynchronous error motion of a rotary axis, µm (ISO 230-7): greatest range of the runs at one angle. Absent
-    /// for a single run, and under the same conditions.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub asynchronous_error_motion_um: Option<f64>,
-    /// Uncertainties of the figures by the set-up.
-    #[serde(skip)]
-    pub(crate) set_up_u: FigureUncertainties,
+    /// Figures of this direction: G, F. A rotary axis that makes a full turn with the linear axes at rest and the bar radial
+    /// to the axis has error motions, the asynchronous one for several runs.
+    pub figures: Vec<Figure>,
 }
 
 /// Contribution of one classical fault.

@@ -35,7 +35,7 @@ struct Coordinate {
 
 /// Standard uncertainties of the figures of a path by the set-up, µm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct FigureUncertainties {
+pub(super) struct FigureUncertainties {
     /// Of the range of the radial deviations.
     pub range_um: f64,
     /// Of the greatest radial deviation.

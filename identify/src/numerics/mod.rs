@@ -25,3 +25,14 @@ pub mod tolerances;
 pub mod triangle;
 
 pub use median::{median, robust_deviation};
+
+/// The least and the greatest of some values; infinite without any.
+pub fn ends(values: &[f64]) -> [f64; 2] {
+    values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], x| [least.min(*x), most.max(*x)])
+}
+
+/// Their difference; 0 without any.
+pub fn range(values: &[f64]) -> f64 {
+    let [least, most] = ends(values);
+    (most - least).max(0.0)
+}

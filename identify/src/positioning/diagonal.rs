@@ -12,7 +12,9 @@ use abbe_model::session::{Session, Test};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{FigureUncertainties, Figures, Place, Position, SAME, approaches, figures, places, uncertainty};
+use super::{Deviations, Place, SAME, approaches, places};
+use crate::figure::{self, Figure};
+use crate::numerics::range;
 
 /// Least movement of an axis that moves, mm.
 const MOVES: f64 = 1e-3;
@@ -44,18 +46,11 @@ pub struct DiagonalTest {
     /// Whether the axes move one after the other (step diagonal).
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub in_turn: bool,
-    /// The unit of all figures: `um`.
-    pub unit: String,
     /// The measured length, mm.
     pub length_mm: f64,
-    /// The positions from the start of the diagonal, ascending, mm.
-    pub positions: Vec<Position>,
-    /// The figures of the diagonal.
+    /// The deviations.
     #[serde(flatten)]
-    pub figures: Figures,
-    /// Expanded uncertainties of the figures, if the test states contributors.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub uncertainty: Option<FigureUncertainties>,
+    pub read: Deviations,
 }
 
 /// The largest figures of the diagonals of a kind: E, R, M and B of ISO 230-6.
@@ -68,20 +63,8 @@ pub struct LargestOfDiagonals {
     pub in_turn: bool,
     /// Their tests.
     pub tests: Vec<String>,
-    /// The unit of all figures: `um`.
-    pub unit: String,
-    /// Largest systematic deviation E.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub systematic: Option<f64>,
-    /// Largest repeatability R.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub repeatability: Option<f64>,
-    /// Largest range of the mean deviation M.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mean_range: Option<f64>,
-    /// Largest reversal value B.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub reversal: Option<f64>,
+    /// The largest of each figure that all of them have.
+    pub figures: Vec<Figure>,
 }
 
 /// The figures of every test with readings along a diagonal.
@@ -101,19 +84,16 @@ pub fn largest(tests: &[DiagonalTest]) -> Vec<LargestOfDiagonals> {
     let of_kind = |(kind, in_turn): (DiagonalKind, bool)| {
         let own: Vec<&DiagonalTest> =
             tests.iter().filter(|test| (test.kind, test.in_turn) == (kind, in_turn)).collect();
-        // None if one of them lacks the figure.
-        let greatest = |of: fn(&Figures) -> Option<f64>| {
-            own.iter().map(|test| of(&test.figures)).reduce(|a, b| Some(a?.max(b?))).flatten()
+        let greatest = |id: &&str| {
+            let all = own.iter().map(|test| figure::find(&test.read.figures, id)).collect::<Option<Vec<_>>>()?;
+            let most = all.iter().map(|found| found.value).fold(f64::NEG_INFINITY, f64::max);
+            Some(all[0].definition.with_value(most, &all[0].unit))
         };
         (own.len() > 1).then(|| LargestOfDiagonals {
             kind,
             in_turn,
             tests: own.iter().map(|test| test.test.clone()).collect(),
-            unit: own[0].unit.clone(),
-            systematic: greatest(|figures| figures.systematic),
-            repeatability: greatest(|figures| figures.repeatability),
-            mean_range: greatest(|figures| figures.mean_range),
-            reversal: greatest(|figures| figures.reversal),
+            figures: figure::OF_DIAGONALS.iter().filter_map(greatest).collect(),
         })
     };
     kinds.into_iter().filter_map(of_kind).collect()
@@ -133,29 +113,24 @@ fn of_test(session: &Session, test: &Test, left_out: &[bool]) -> Option<Diagonal
     let factor = way.sign * unit.per_internal();
     let deviation = |row: usize, values: &[f64]| (values[0] - nominal[row]) * factor;
     let positions = approaches(readings, left_out, 0, &way.places, |at| at, deviation);
-    let [figures, shares] = figures::figures(&positions);
+    let read = Deviations::of(test, unit.name().to_string(), AxisKind::Linear.unit(), positions, Some(way.length));
     let kind = if axes.len() == 2 { DiagonalKind::Face } else { DiagonalKind::Body };
-    let has_figure = figures.systematic_forward.is_some() || figures.systematic_backward.is_some();
+    let has_figure =
+        ["systematic_forward", "systematic_backward"].iter().any(|id| figure::find(&read.figures, id).is_some());
     has_figure.then(|| DiagonalTest {
         test: test.name.clone(),
         kind,
         axes: axes.iter().map(|axis| machine.axes[*axis].name.clone()).collect(),
         direction: way.rises.iter().map(|rises| if *rises { 'P' } else { 'N' }).collect(),
         in_turn: way.in_turn,
-        unit: unit.name().to_string(),
         length_mm: way.length,
-        positions,
-        figures,
-        uncertainty: test.contributors.map(|of| uncertainty::expanded(&of, Some(way.length), shares)),
+        read,
     })
 }
 
 /// The axes that move, by name, if they are two or three linear ones.
 fn moved(machine: &Machine, readings: &Readings) -> Option<Vec<usize>> {
-    let moves = |axis: &usize| {
-        let [low, high] = super::ends(&readings.positions[*axis]);
-        high - low > MOVES
-    };
+    let moves = |axis: &usize| range(&readings.positions[*axis]) > MOVES;
     let mut axes: Vec<usize> = (0..machine.axes.len()).filter(moves).collect();
     axes.sort_by_key(|axis| machine.axes[*axis].name.clone());
     let all_linear = axes.iter().all(|axis| machine.axes[*axis].kind == AxisKind::Linear);

@@ -12,46 +12,8 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// Figures of ISO 230-2 over all positions.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
-pub struct Figures {
-    /// Unidirectional accuracy A↑, from the runs in positive direction; absent with fewer than two.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub accuracy_forward: Option<f64>,
-    /// Unidirectional accuracy A↓.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub accuracy_backward: Option<f64>,
-    /// Bidirectional accuracy A.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub accuracy: Option<f64>,
-    /// Unidirectional repeatability R↑.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub repeatability_forward: Option<f64>,
-    /// Unidirectional repeatability R↓.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub repeatability_backward: Option<f64>,
-    /// Bidirectional repeatability R.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub repeatability: Option<f64>,
-    /// Unidirectional systematic deviation E↑.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub systematic_forward: Option<f64>,
-    /// Unidirectional systematic deviation E↓.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub systematic_backward: Option<f64>,
-    /// Bidirectional systematic deviation E.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub systematic: Option<f64>,
-    /// Range of the mean bidirectional deviation M.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mean_range: Option<f64>,
-    /// Reversal value B: the largest |Bᵢ|.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub reversal: Option<f64>,
-    /// Mean reversal value B̄.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mean_reversal: Option<f64>,
-}
+use super::uncertainty::OfReadings;
+use crate::figure::{Definition, Figure, POSITIONING};
 
 /// The deviations at one position.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -92,16 +54,16 @@ impl Approach {
         let count = self.count as f64;
         let share = 1.0 / count;
         if deviations == 0.0 {
-            return Some(Value { value: self.mean, share });
+            return Some(Value::of(self.mean, share));
         }
         let value = self.mean + deviations * self.deviation?;
-        Some(Value { value, share: share + deviations.powi(2) / (count - 1.0) })
+        Some(Value::of(value, share + deviations.powi(2) / (count - 1.0)))
     }
 
     /// So many standard deviations.
     fn spread(self, deviations: f64) -> Option<Value> {
         let share = deviations.powi(2) / (self.count as f64 - 1.0);
-        Some(Value { value: deviations * self.deviation?, share })
+        Some(Value::of(deviations * self.deviation?, share))
     }
 }
 
@@ -113,11 +75,18 @@ impl Approach {
 struct Value {
     value: f64,
     share: f64,
+    /// Whether it is the difference of values of two positions.
+    compares_positions: bool,
 }
 
 impl Value {
+    /// Of one position.
+    fn of(value: f64, share: f64) -> Value {
+        Value { value, share, compares_positions: false }
+    }
+
     fn plus(self, other: Value) -> Value {
-        Value { value: self.value + other.value, share: self.share + other.share }
+        Value { value: self.value + other.value, share: self.share + other.share, ..self }
     }
 
     fn minus(self, other: Value) -> Value {
@@ -125,7 +94,7 @@ impl Value {
     }
 
     fn times(self, factor: f64) -> Value {
-        Value { value: factor * self.value, share: factor * factor * self.share }
+        Value { value: factor * self.value, share: factor * factor * self.share, ..self }
     }
 
     fn largest(self, other: Value) -> Value {
@@ -155,14 +124,15 @@ impl Position {
     }
 }
 
-/// The figures of deviations at positions, and for each its variance per variance of an independent error of every reading.
-pub(super) fn figures(positions: &[Position]) -> [Figures; 2] {
+/// The figures of deviations at positions, with their standard uncertainties if the test states contributors.
+pub(super) fn figures(positions: &[Position], unit: &str, u: Option<OfReadings>) -> Vec<Figure> {
     type Of<'f> = &'f dyn Fn(&Position) -> Option<Value>;
     // A figure of an axis exists if every position has the values that it combines.
     let all = |of: Of<'_>| positions.iter().map(of).collect::<Option<Vec<Value>>>().filter(|all| !all.is_empty());
     let greatest = |of: Of<'_>| all(of)?.into_iter().reduce(Value::largest);
     let least = |of: Of<'_>| all(of)?.into_iter().reduce(Value::smallest);
-    let range = |high: Of<'_>, low: Of<'_>| Some(greatest(high)?.minus(least(low)?));
+    let range =
+        |high: Of<'_>, low: Of<'_>| Some(Value { compares_positions: true, ..greatest(high)?.minus(least(low)?) });
     let forward = |deviations: f64| move |p: &Position| p.forward?.with(deviations);
     let backward = |deviations: f64| move |p: &Position| p.backward?.with(deviations);
     let larger =
@@ -175,69 +145,25 @@ pub(super) fn figures(positions: &[Position]) -> [Figures; 2] {
         let share = 1.0 / all.len() as f64;
         Some(all.into_iter().reduce(|sum, one| sum.plus(one))?.times(share))
     });
-    let found = [
+    // In the order of the table.
+    let found: [Option<Value>; POSITIONING.len()] = [
+        range(&larger(2.0), &smaller(-2.0)),
         range(&forward(2.0), &forward(-2.0)),
         range(&backward(2.0), &backward(-2.0)),
-        range(&larger(2.0), &smaller(-2.0)),
+        greatest(&Position::repeatability),
         greatest(&|p| p.forward?.spread(4.0)),
         greatest(&|p| p.backward?.spread(4.0)),
-        greatest(&Position::repeatability),
+        range(&larger(0.0), &smaller(0.0)),
         range(&forward(0.0), &forward(0.0)),
         range(&backward(0.0), &backward(0.0)),
-        range(&larger(0.0), &smaller(0.0)),
         range(&Position::mean, &Position::mean),
         greatest(&size),
         mean_reversal,
     ];
-    [|of: Value| of.value, |of: Value| of.share].map(|part| Figures::of(found.map(|figure| figure.map(part))))
-}
-
-impl Figures {
-    /// In the order of the fields.
-    fn of(all: [Option<f64>; 12]) -> Figures {
-        let [
-            accuracy_forward,
-            accuracy_backward,
-            accuracy,
-            repeatability_forward,
-            repeatability_backward,
-            repeatability,
-            ..,
-        ] = all;
-        let [.., systematic_forward, systematic_backward, systematic, mean_range, reversal, mean_reversal] = all;
-        Figures {
-            accuracy_forward,
-            accuracy_backward,
-            accuracy,
-            repeatability_forward,
-            repeatability_backward,
-            repeatability,
-            systematic_forward,
-            systematic_backward,
-            systematic,
-            mean_range,
-            reversal,
-            mean_reversal,
-        }
-    }
-
-    /// Every figure converted: `apart` of figures that compare two positions, `within` of those of one position.
-    pub(super) fn each(self, apart: impl Fn(f64) -> f64, within: impl Fn(f64) -> f64) -> Figures {
-        let apart = |figure: Option<f64>| figure.map(&apart);
-        let within = |figure: Option<f64>| figure.map(&within);
-        Figures {
-            accuracy_forward: apart(self.accuracy_forward),
-            accuracy_backward: apart(self.accuracy_backward),
-            accuracy: apart(self.accuracy),
-            repeatability_forward: within(self.repeatability_forward),
-            repeatability_backward: within(self.repeatability_backward),
-            repeatability: within(self.repeatability),
-            systematic_forward: apart(self.systematic_forward),
-            systematic_backward: apart(self.systematic_backward),
-            systematic: apart(self.systematic),
-            mean_range: apart(self.mean_range),
-            reversal: within(self.reversal),
-            mean_reversal: within(self.mean_reversal),
-        }
-    }
+    let figure = |(definition, found): (&'static Definition, Option<Value>)| {
+        let Value { value, share, compares_positions } = found?;
+        let u = u.map(|of| of.u(share, compares_positions));
+        Some(Figure { u, ..definition.with_value(value, unit) })
+    };
+    POSITIONING.iter().zip(found).filter_map(figure).collect()
 }

@@ -13,8 +13,10 @@ use abbe_model::session::{Session, Test};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-pub use self::figures::{Approach, Figures, Position};
-pub use self::uncertainty::FigureUncertainties;
+pub use self::figures::{Approach, Position};
+pub use self::uncertainty::Contributions;
+use crate::figure::Figure;
+use crate::numerics::range;
 
 /// Positions that agree to this are one, mm or rad.
 const SAME: f64 = 1e-4;
@@ -26,18 +28,40 @@ pub struct PositioningTest {
     pub test: String,
     /// The axis.
     pub axis: String,
-    /// The unit of all figures: `um` or `arcsec`.
+    /// The deviations.
+    #[serde(flatten)]
+    pub read: Deviations,
+}
+
+/// What has been read at positions along an axis or a diagonal.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Deviations {
+    /// The unit of deviations: `um` or `arcsec`.
     pub unit: String,
     /// The unit of positions: `mm` or `deg`.
     pub position_unit: String,
-    /// The positions, ascending.
+    /// The positions, ascending; along a diagonal from its start.
     pub positions: Vec<Position>,
-    /// The figures of the axis.
-    #[serde(flatten)]
-    pub figures: Figures,
-    /// Expanded uncertainties of the figures, if the test states contributors.
+    /// The figures of ISO 230-2: with standard uncertainties, if the test states contributors.
+    pub figures: Vec<Figure>,
+    /// The contributors to these uncertainties.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub uncertainty: Option<FigureUncertainties>,
+    pub uncertainty: Option<Contributions>,
+}
+
+impl Deviations {
+    /// Of positions along a length in mm, or of an axis of rotation.
+    fn of(
+        test: &Test,
+        unit: String,
+        position_unit: &str,
+        positions: Vec<Position>,
+        length_mm: Option<f64>,
+    ) -> Deviations {
+        let (uncertainty, u) = test.contributors.map(|of| uncertainty::contributions(&of, length_mm)).unzip();
+        let figures = figures::figures(&positions, &unit, u);
+        Deviations { unit, position_unit: position_unit.to_string(), positions, figures, uncertainty }
+    }
 }
 
 /// The figures of every test with readings in which one axis moves and whose first channel is read along or about it.
@@ -86,25 +110,12 @@ fn of_test(session: &Session, test: &Test, left_out: &[bool]) -> Option<Position
     if !positions.iter().any(|position| repeated(position.forward) || repeated(position.backward)) {
         return None;
     }
-    let [figures, shares] = figures::figures(&positions);
-    let of_readings = &readings.positions[axis];
-    let [low, high] = ends(of_readings);
-    let length = (!is_rotary).then_some(high - low);
-    let uncertainty = test.contributors.map(|of| uncertainty::expanded(&of, length, shares));
+    let length_mm = (!is_rotary).then(|| range(&readings.positions[axis]));
     Some(PositioningTest {
         test: test.name.clone(),
         axis: machine.axes[axis].name.clone(),
-        unit: unit.name().to_string(),
-        position_unit: kind.unit().to_string(),
-        positions,
-        figures,
-        uncertainty,
+        read: Deviations::of(test, unit.name().to_string(), kind.unit(), positions, length_mm),
     })
-}
-
-/// The least and the greatest value.
-fn ends(values: &[f64]) -> [f64; 2] {
-    values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(*value), high.max(*value)])
 }
 
 /// The only axis that moves in a test.

@@ -21,14 +21,12 @@ use abbe_model::session::contributors::Contributors;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::figures::Figures;
-
 /// The coverage factor.
 const COVERAGE: f64 = 2.0;
 
-/// Expanded uncertainties of positioning figures, and their contributors, in the unit of the figures.
+/// Expanded uncertainties of positioning figures by each contributor, in the unit of the figures.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct FigureUncertainties {
+pub struct Contributions {
     /// The coverage factor k = 2.
     pub coverage_factor: f64,
     /// Expanded uncertainty of the device over the measured length.
@@ -43,14 +41,27 @@ pub struct FigureUncertainties {
     pub environment: f64,
     /// That of the set-up.
     pub setup: f64,
-    /// Expanded uncertainty of each figure.
-    #[serde(flatten)]
-    pub figures: Figures,
 }
 
-/// The expanded uncertainties over a length in mm, or of an axis of rotation, of figures with these variances per variance
-/// of an independent error of every reading.
-pub(super) fn expanded(of: &Contributors, length_mm: Option<f64>, shares: Figures) -> FigureUncertainties {
+/// What gives the uncertainty of a figure.
+#[derive(Clone, Copy)]
+pub(super) struct OfReadings {
+    /// Variance of what grows with the measured length.
+    over_length: f64,
+    /// Standard uncertainty of one reading by the environment.
+    environment: f64,
+}
+
+impl OfReadings {
+    /// The standard uncertainty of a figure with this variance per variance of an independent error of every reading.
+    pub fn u(self, share: f64, compares_positions: bool) -> f64 {
+        let over_length = if compares_positions { self.over_length } else { 0.0 };
+        (over_length + share * self.environment * self.environment).sqrt()
+    }
+}
+
+/// The contributions over a length in mm, or of an axis of rotation, and what they give for a figure.
+pub(super) fn contributions(of: &Contributors, length_mm: Option<f64>) -> (Contributions, OfReadings) {
     let stated = |value: Option<abbe_model::document::value::NotNegative>| value.map_or(0.0, |value| value.0);
     let metres = length_mm.unwrap_or(0.0) / 1e3;
     let is_length = length_mm.is_some();
@@ -66,12 +77,7 @@ pub(super) fn expanded(of: &Contributors, length_mm: Option<f64>, shares: Figure
     let environment = rectangular(choose(of.environment_um, of.environment_arcsec));
     let setup = choose(of.setup_u_um, of.setup_u_arcsec);
     let over_length = [device, misalignment, temperature, expansion, setup].iter().map(|u| u * u).sum::<f64>();
-    let of_readings = |share: f64| share * environment * environment;
-    let figures = shares.each(
-        |share| COVERAGE * (over_length + of_readings(share)).sqrt(),
-        |share| COVERAGE * of_readings(share).sqrt(),
-    );
-    FigureUncertainties {
+    let contributions = Contributions {
         coverage_factor: COVERAGE,
         device: COVERAGE * device,
         misalignment: COVERAGE * misalignment,
@@ -79,6 +85,6 @@ pub(super) fn expanded(of: &Contributors, length_mm: Option<f64>, shares: Figure
         expansion: COVERAGE * expansion,
         environment: COVERAGE * environment,
         setup: COVERAGE * setup,
-        figures,
-    }
+    };
+    (contributions, OfReadings { over_length, environment })
 }

@@ -6,7 +6,7 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::session::readings::Readings;
 
-use crate::numerics::circle;
+use crate::numerics::{circle, range};
 
 /// Tolerance of equal positions: mm or rad.
 const POSITION_TOLERANCE: f64 = 1e-6;
@@ -37,12 +37,6 @@ pub struct PathSegment {
     pub rows: Range<usize>,
     /// Whether the abscissa increases; `None` for poses.
     pub forward: Option<bool>,
-}
-
-fn range(values: &[f64]) -> f64 {
-    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    (high - low).max(0.0)
 }
 
 impl Abscissa {

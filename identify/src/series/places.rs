@@ -3,6 +3,7 @@
 use abbe_model::axis::AxisKind;
 
 use super::{SessionSeries, lengths};
+use crate::numerics::range;
 use crate::problem::Problem;
 
 /// The residual of an observed direction, in the unit of the series, where the mount points.
@@ -141,12 +142,6 @@ pub fn views(problem: &Problem, series: &SessionSeries) -> Vec<View> {
         })
         .filter(|view| view.cells.len() >= MIN_CELLS)
         .collect()
-}
-
-fn range(values: &[f64]) -> f64 {
-    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    (high - low).max(0.0)
 }
 
 /// The side of a cell, and the cells in the order of their rows and columns.

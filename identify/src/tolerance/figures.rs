@@ -6,7 +6,8 @@ use abbe_model::instrument::ballbar::BAR;
 use abbe_model::session::tolerance::TestFigure;
 use abbe_model::session::{Prior, Session};
 
-use crate::circular::{CircularTest, DirectionFigures};
+use crate::circular::CircularTest;
+use crate::figure::{self, Figure};
 
 /// Measured values of one quantity with their standard uncertainties. All have to be within its limits.
 pub(super) struct Measured {
@@ -28,39 +29,18 @@ pub(super) fn measured(
     };
     let runs = found.directions.iter().map(|direction| direction.runs).min().unwrap_or(1).max(1) as f64;
     let mean_um = noise_um / runs.sqrt();
-    let range_um = mean_um * SQRT_2;
-    let of_directions = |value: fn(&DirectionFigures) -> (f64, f64)| found.directions.iter().map(value).collect();
-    let both = |value: Option<f64>, set_up_um: f64| value.map(|value| (value, set_up_um)).into_iter().collect();
-    // Values with their uncertainties by the set-up.
-    let (values, u_um): (Vec<(f64, f64)>, f64) = match figure {
-        TestFigure::CircularDeviation => {
-            (of_directions(|direction| (direction.circular_deviation_um, direction.set_up_u.range_um)), range_um)
-        }
-        TestFigure::BidirectionalCircularDeviation => {
-            (both(found.bidirectional_circular_deviation_um, found.set_up_u.range_um), range_um)
-        }
-        // Differences between directions and between runs do not contain the set-up.
-        TestFigure::Hysteresis => (both(found.hysteresis_um, 0.0), range_um),
-        TestFigure::SynchronousErrorMotion => (
-            some(found, |direction| Some((direction.synchronous_error_motion_um?, direction.set_up_u.range_um))),
-            range_um,
-        ),
+    let u_um = match figure {
         // The range of single runs, not of their mean.
-        TestFigure::AsynchronousErrorMotion => {
-            (some(found, |direction| Some((direction.asynchronous_error_motion_um?, 0.0))), noise_um * SQRT_2)
+        TestFigure::AsynchronousErrorMotion => noise_um * SQRT_2,
+        TestFigure::MeanBidirectionalRadialDeviation | TestFigure::RadialDeviation => {
+            mean_um.hypot(bar_u_um(session, test)?)
         }
-        TestFigure::MeanBidirectionalRadialDeviation => (
-            both(found.mean_bidirectional_radial_deviation_um, found.set_up_u.mean_um),
-            mean_um.hypot(bar_u_um(session, test)?),
-        ),
-        TestFigure::RadialDeviation => {
-            let ends: [Vec<(f64, f64)>; 2] = [
-                of_directions(|direction| (direction.radial_deviation_max_um, direction.set_up_u.max_um)),
-                of_directions(|direction| (direction.radial_deviation_min_um, direction.set_up_u.min_um)),
-            ];
-            (ends.concat(), mean_um.hypot(bar_u_um(session, test)?))
-        }
+        _ => mean_um * SQRT_2,
     };
+    let ends = ["max", "min"].map(|end| format!("{}_{end}", figure.word()));
+    let ids = if figure == TestFigure::RadialDeviation { ends.to_vec() } else { vec![figure.word().to_string()] };
+    let lists = || found.directions.iter().map(|direction| &direction.figures).chain([&found.figures]);
+    let values: Vec<&Figure> = ids.iter().flat_map(|id| lists().filter_map(|list| figure::find(list, id))).collect();
     if values.is_empty() {
         const ERROR_MOTION: &str =
             "a full turn of a rotary axis, with the linear axes at rest and the bar radial to the axis";
@@ -74,24 +54,19 @@ pub(super) fn measured(
             }
         ));
     }
-    if values.iter().any(|(_, set_up_um)| set_up_um.is_infinite()) {
+    if values.iter().any(|found| found.set_up_u.is_infinite()) {
         return Err(format!(
             "{} of test \"{test}\" contains the position of a ball that is not known: state workpiece_ball_u_um and \
              spindle_ball_u_um",
             figure.word().replace('_', " ")
         ));
     }
-    let with_u = |(value, set_up_um): (f64, f64)| (value, u_um.hypot(instrument_u_um).hypot(set_up_um));
+    let with_u = |found: &Figure| (found.value, u_um.hypot(instrument_u_um).hypot(found.set_up_u));
     let values: Vec<(f64, f64)> = values.into_iter().map(with_u).collect();
     if values.iter().any(|(_, u)| *u <= 0.0) {
         return Err("the uncertainty is not quantified: state `instrument_u_um`".to_string());
     }
     Ok(Measured { values, unit: "um".to_string() })
-}
-
-/// The values of both directions that exist.
-fn some(found: &CircularTest, value: fn(&DirectionFigures) -> Option<(f64, f64)>) -> Vec<(f64, f64)> {
-    found.directions.iter().filter_map(value).collect()
 }
 
 /// Standard uncertainty of the length of the bar of a test, µm; the reason if nothing is known about the length.

@@ -72,17 +72,6 @@ pub enum TestFigure {
 }
 
 impl TestFigure {
-    /// The figures.
-    pub const ALL: [TestFigure; 7] = [
-        TestFigure::CircularDeviation,
-        TestFigure::BidirectionalCircularDeviation,
-        TestFigure::RadialDeviation,
-        TestFigure::MeanBidirectionalRadialDeviation,
-        TestFigure::Hysteresis,
-        TestFigure::SynchronousErrorMotion,
-        TestFigure::AsynchronousErrorMotion,
-    ];
-
     /// Its key in session files, without the unit.
     pub fn word(self) -> &'static str {
         match self {

@@ -91,6 +91,18 @@ fn um(test: &Value, key: &str) -> f64 {
     test[key].as_f64().unwrap()
 }
 
+/// The figure of a standard with an identifier, of a test or of one direction.
+fn figure_of_standard<'v>(of: &'v Value, id: &str) -> Option<&'v Value> {
+    of["figures"].as_array().unwrap().iter().find(|figure| figure["id"] == id)
+}
+
+/// Its value, µm.
+fn figure_um(of: &Value, id: &str) -> f64 {
+    let figure = figure_of_standard(of, id).unwrap_or_else(|| panic!("no {id}: {of}"));
+    assert_eq!(figure["unit"], "um", "{figure}");
+    um(figure, "value")
+}
+
 /// A cubic error of one axis is not reported as a cyclic error of the other; a screw pitch error is.
 #[test]
 fn a_cubic_is_not_called_cyclic() {
@@ -193,12 +205,12 @@ fn an_outlier_is_excluded() {
             [smooth[0] + chip[0], smooth[1] + chip[1]]
         });
         for direction in test["directions"].as_array().unwrap() {
-            assert!((um(direction, "circular_deviation_um") - 3.0).abs() < 0.01, "{test}");
-            assert!((um(direction, "radial_deviation_max_um") - 4.0).abs() < 0.01);
-            assert!((um(direction, "radial_deviation_min_um") - 1.0).abs() < 0.01);
+            assert!((figure_um(direction, "circular_deviation") - 3.0).abs() < 0.01, "{test}");
+            assert!((figure_um(direction, "radial_deviation_max") - 4.0).abs() < 0.01);
+            assert!((figure_um(direction, "radial_deviation_min") - 1.0).abs() < 0.01);
         }
-        assert!((um(&test, "bidirectional_circular_deviation_um") - 3.0).abs() < 0.01);
-        assert!(um(&test, "hysteresis_um") < 0.01, "{test}");
+        assert!((figure_um(&test, "bidirectional_circular_deviation") - 3.0).abs() < 0.01);
+        assert!(figure_um(&test, "hysteresis") < 0.01, "{test}");
         is(&test, "scale mismatch", "XY", "ratio", 30.0, 0.05);
     }
 }
@@ -214,20 +226,20 @@ fn every_fault_agrees_with_its_closed_form() {
     is(&test, "scale mismatch", "XY", "ratio", 30.0, 0.01);
     is(&test, "scale mismatch", "XY", "over_diameter", 6.0, 0.002);
     for direction in test["directions"].as_array().unwrap() {
-        assert!((um(direction, "circular_deviation_um") - 3.0).abs() < 0.006, "{test}");
-        assert!((um(direction, "radial_deviation_max_um") - 4.0).abs() < 0.006);
-        assert!((um(direction, "radial_deviation_min_um") - 1.0).abs() < 0.006);
+        assert!((figure_um(direction, "circular_deviation") - 3.0).abs() < 0.006, "{test}");
+        assert!((figure_um(direction, "radial_deviation_max") - 4.0).abs() < 0.006);
+        assert!((figure_um(direction, "radial_deviation_min") - 1.0).abs() < 0.006);
     }
-    assert!((um(&test, "bidirectional_circular_deviation_um") - 3.0).abs() < 0.006);
-    assert!((um(&test, "mean_bidirectional_radial_deviation_um") - 2.5).abs() < 0.006);
-    assert!(um(&test, "hysteresis_um") < 0.002);
+    assert!((figure_um(&test, "bidirectional_circular_deviation") - 3.0).abs() < 0.006);
+    assert!((figure_um(&test, "mean_bidirectional_radial_deviation") - 2.5).abs() < 0.006);
+    assert!(figure_um(&test, "hysteresis") < 0.002);
     assert!(test["diagnosis"][0]["fault"] == "scale mismatch");
     assert!(um(&test["diagnosis"][0], "share_percent") > 99.0, "{test}");
 
     // Y is inclined by 20 µm/m towards −X: the angle between the positive axes exceeds 90°.
     let test = circle(folder.path(), &both, true, |at| [-20e-6 * q(at)[1], 0.0]);
     is(&test, "squareness", "XY", "angle", 20.0, 0.01);
-    assert!((um(&test, "bidirectional_circular_deviation_um") - 2.0).abs() < 0.006);
+    assert!((figure_um(&test, "bidirectional_circular_deviation") - 2.0).abs() < 0.006);
 
     // X lags by 0.3 ms, Y by 0.1 ms.
     let test = circle(folder.path(), &both, true, |at| {
@@ -237,7 +249,7 @@ fn every_fault_agrees_with_its_closed_form() {
     is(&test, "servo mismatch", "XY", "delay", 0.2, 1e-3);
     assert!((um(&test, "feed_mm_min") - 1200.0).abs() < 1.0);
     // ½v·Δτ·sin 2θ in both signs: a difference of twice 2 µm.
-    assert!((um(&test, "hysteresis_um") - 4.0).abs() < 0.01, "{test}");
+    assert!((figure_um(&test, "hysteresis") - 4.0).abs() < 0.01, "{test}");
 
     // X loses 3 µm at its positive end and 1 µm at the other.
     let test = circle(folder.path(), &both, true, |at| [-0.5 * (2e-3 + 1e-3 * at.angle.cos()) * at.travels[0], 0.0]);
@@ -338,7 +350,7 @@ fn quantities_that_one_direction_does_not_determine_are_listed() {
             && undetermined.contains("hysteresis require"),
         "{undetermined}"
     );
-    assert!(test.get("hysteresis_um").is_none() && test.get("feed_mm_min").is_none());
+    assert!(figure_of_standard(&test, "hysteresis").is_none() && test.get("feed_mm_min").is_none());
     // Without time a lag is stated as a length.
     let test = circle(folder.path(), &[1.0, -1.0], false, |_| [0.0, 0.0]);
     let undetermined = test["not_identifiable"].to_string();
@@ -405,7 +417,7 @@ fn rotary_axes_have_figures_without_a_diagnosis() {
     assert!(c.get("diagnosis").is_none() && c.get("radius_mm").is_none());
     // EXC of order 3 along a stationary bar gives orders 2 and 4 of half its size: 5·cos 3θ·cos θ, a range of twice 5
     // µm plus the noise.
-    let g = um(c, "bidirectional_circular_deviation_um");
+    let g = figure_um(c, "bidirectional_circular_deviation");
     assert!((8.0..12.5).contains(&g), "{c}");
 }
 
@@ -450,7 +462,7 @@ fn a_short_arc_is_reported_as_an_arc() {
     }
     // 40 µm/m of X alone, from the centre of the set-up: 40·cos²θ·R, between 30° and 90°.
     let direction = &test["directions"][0];
-    assert!((um(direction, "circular_deviation_um") - 3.0).abs() < 0.06, "{test}");
+    assert!((figure_um(direction, "circular_deviation") - 3.0).abs() < 0.06, "{test}");
 }
 
 /// One direction with a few high places: its own least-squares circle is farther from the minimum zone than that of both
@@ -467,9 +479,9 @@ fn both_directions_are_no_narrower_than_one() {
             let radial = if at.path > 0.0 { there } else { back };
             [radial * at.angle.cos(), radial * at.angle.sin()]
         });
-        let both = um(&test, "bidirectional_circular_deviation_um");
+        let both = figure_um(&test, "bidirectional_circular_deviation");
         for direction in test["directions"].as_array().unwrap() {
-            assert!(um(direction, "circular_deviation_um") <= both + 1e-9, "{seed}: {both} {direction}");
+            assert!(figure_um(direction, "circular_deviation") <= both + 1e-9, "{seed}: {both} {direction}");
         }
     }
 }

@@ -7,6 +7,7 @@ use std::f64::consts::TAU;
 use abbe::files::read::add_node;
 use abbe::files::table::memory::MemoryColumn;
 use abbe::identify::circular::{CircularTest, of_session};
+use abbe::identify::figure::find;
 use abbe::identify::noise::ReadingNoise;
 use abbe::identify::tolerance::rule::Decision;
 use abbe::identify::tolerance::{ConformityItem, conformity};
@@ -176,7 +177,8 @@ fn error_motions_need_a_radial_bar() {
         let said = found.not_identifiable.iter().any(|words| words.contains("the bar is not radial to C"));
         assert_eq!(said, !is_radial, "{height}: {:?}", found.not_identifiable);
         for direction in &found.directions {
-            let motions = [direction.synchronous_error_motion_um, direction.asynchronous_error_motion_um];
+            let motions = ["synchronous_error_motion", "asynchronous_error_motion"]
+                .map(|id| find(&direction.figures, id).map(|figure| figure.value));
             assert_eq!(motions.map(|motion| motion.is_some()), [is_radial; 2], "{height}: {direction:?}");
             for (motion, expected) in motions.into_iter().zip([8.0, 3.0]) {
                 // Both ends of the turn count, so that the centre absorbs a part of the second harmonic.

@@ -1,7 +1,8 @@
 //! Diagonals of ISO 230-6 and the uncertainty of positioning figures: closed forms, the plant, and simulated tests.
 
+use abbe::identify::figure::{Figure, find};
 use abbe::identify::positioning::diagonal::{self, DiagonalKind, DiagonalTest};
-use abbe::identify::positioning::{self, FigureUncertainties, Figures, PositioningTest};
+use abbe::identify::positioning::{self, Contributions, PositioningTest};
 
 use super::*;
 
@@ -109,6 +110,10 @@ fn found(tests: &[(&str, [[f64; 3]; 2], String)]) -> Vec<DiagonalTest> {
     diagonal::of_session(&session, &kept)
 }
 
+fn value(figures: &[Figure], id: &str) -> Option<f64> {
+    find(figures, id).map(|figure| figure.value)
+}
+
 fn close(found: Option<f64>, expected: f64, what: &str) {
     let found = found.unwrap_or_else(|| panic!("no {what}"));
     assert!((found - expected).abs() < 2e-3, "{what}: {found}, not {expected}");
@@ -126,29 +131,31 @@ fn figures_of_body_diagonals_are_those_of_the_closed_form() {
     assert_eq!(found.len(), 4);
     for (test, name) in found.iter().zip(names) {
         assert_eq!((test.kind, test.direction.as_str(), test.in_turn), (DiagonalKind::Body, name, false));
-        assert_eq!((test.axes.join(""), test.positions.len()), ("XYZ".into(), 11));
+        assert_eq!((test.axes.join(""), test.read.positions.len()), ("XYZ".into(), 11));
         assert!((test.length_mm - LENGTH).abs() < 1e-9);
         // Y leans towards −X by the squareness.
         let [x, y] = [0, 1].map(|axis| if name.as_bytes()[axis] == b'P' { SIDES[axis] } else { -SIDES[axis] });
         let slope_um = 1e3 * x * (scale * x - gamma * y) / LENGTH;
         let lost_um = 1e3 * x.abs() * backlash / LENGTH;
-        let figures = test.figures;
-        close(figures.mean_range, slope_um.abs(), "M");
-        close(figures.systematic_forward, slope_um.abs(), "E forward");
-        close(figures.systematic_backward, slope_um.abs(), "E backward");
-        close(figures.systematic, slope_um.abs() + lost_um, "E");
-        close(figures.reversal, lost_um, "B");
-        close(figures.repeatability, lost_um, "R");
-        let last = test.positions.last().unwrap();
+        let figures = &test.read.figures;
+        close(value(figures, "mean_range"), slope_um.abs(), "M");
+        close(value(figures, "systematic_forward"), slope_um.abs(), "E forward");
+        close(value(figures, "systematic_backward"), slope_um.abs(), "E backward");
+        close(value(figures, "systematic"), slope_um.abs() + lost_um, "E");
+        close(value(figures, "reversal"), lost_um, "B");
+        close(value(figures, "repeatability"), lost_um, "R");
+        let last = test.read.positions.last().unwrap();
         assert!((last.at - LENGTH).abs() < 1e-9);
         // The deviation grows along the diagonal, and both directions are where they belong.
-        let first = test.positions[0].forward.unwrap().mean;
+        let first = test.read.positions[0].forward.unwrap().mean;
         close(Some(last.forward.unwrap().mean - first), slope_um, "end less start");
     }
     let largest = diagonal::largest(&found);
     assert_eq!((largest.len(), largest[0].tests.len()), (1, 4));
-    let most = found.iter().map(|test| test.figures.systematic.unwrap()).fold(0.0, f64::max);
-    assert_eq!(largest[0].systematic, Some(most));
+    let most = found.iter().map(|test| value(&test.read.figures, "systematic").unwrap()).fold(0.0, f64::max);
+    assert_eq!(value(&largest[0].figures, "systematic"), Some(most));
+    let ids: Vec<&str> = largest[0].figures.iter().map(|figure| figure.definition.id).collect();
+    assert_eq!(ids, ["systematic", "repeatability", "reversal", "mean_range"]);
 }
 
 /// A face of two axes, and a laser that looks along the diagonal from its other end: the names are those of the diagonal.
@@ -165,8 +172,8 @@ fn a_face_diagonal_is_named_by_its_axes() {
     for test in found(&tests) {
         assert_eq!((test.kind, test.axes.join(""), test.direction.as_str()), (DiagonalKind::Face, "XY".into(), "NP"));
         // −γ y x / √(x² + y²)
-        close(test.figures.mean_range, 30e-3 * 600.0 * 200.0 / 600.0_f64.hypot(200.0), "M");
-        let [first, last] = [0, 10].map(|k: usize| test.positions[k].forward.unwrap().mean);
+        close(value(&test.read.figures, "mean_range"), 30e-3 * 600.0 * 200.0 / 600.0_f64.hypot(200.0), "M");
+        let [first, last] = [0, 10].map(|k: usize| test.read.positions[k].forward.unwrap().mean);
         assert!(last > first, "{first} {last}");
     }
 }
@@ -179,17 +186,17 @@ fn a_step_diagonal_reads_after_every_move() {
     let machine = Box3 { scale: [25e-6, 0.0, 0.0], ..Box3::default() };
     let found = found(&[("S", body("PPP"), machine.data(body("PPP"), true, 2, 0.0, &mut random))]);
     let [test] = &found[..] else { panic!("{found:?}") };
-    assert!(test.in_turn && test.direction == "PPP" && test.positions.len() == 31);
-    let mean = |k: usize| test.positions[k].forward.unwrap().mean;
+    assert!(test.in_turn && test.direction == "PPP" && test.read.positions.len() == 31);
+    let mean = |k: usize| test.read.positions[k].forward.unwrap().mean;
     let of_step_um = 25e-3 * 60.0 * SIDES[0] / LENGTH;
     for step in 0..10 {
         close(Some(mean(3 * step + 1) - mean(3 * step)), of_step_um, "X");
         close(Some(mean(3 * step + 3) - mean(3 * step + 1)), 0.0, "Y and Z");
     }
-    close(test.figures.systematic, 10.0 * of_step_um, "E");
+    close(value(&test.read.figures, "systematic"), 10.0 * of_step_um, "E");
     // X falls back by its share of the diagonal.
     let share = SIDES[0] / LENGTH;
-    assert!((test.positions[1].at - 60.0 * share).abs() < 1e-6);
+    assert!((test.read.positions[1].at - 60.0 * share).abs() < 1e-6);
 }
 
 /// Points all over the box are no diagonal, nor is a diagonal that the beam does not follow.
@@ -245,8 +252,9 @@ fn positioning_of(folder: &Folder, data: &str) -> PositioningTest {
 #[test]
 fn expanded_uncertainties_are_those_of_the_closed_form() {
     let test = positioning_of(&Folder::new(), &axis_data(&mut || 0.0, 0.0));
-    let FigureUncertainties { device, misalignment, temperature, expansion, environment, setup, figures, .. } =
-        test.uncertainty.unwrap();
+    let Contributions { device, misalignment, temperature, expansion, environment, setup, .. } =
+        test.read.uncertainty.unwrap();
+    let expanded = |id: &str| 2.0 * find(&test.read.figures, id).unwrap().u.unwrap();
     let root = 12.0_f64.sqrt();
     let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-9, "{found}, not {expected}");
     near(device, 0.6);
@@ -258,12 +266,12 @@ fn expanded_uncertainties_are_those_of_the_closed_form() {
     let over_length: f64 = [device, misalignment, temperature, expansion, setup].iter().map(|u| u * u).sum();
     let with = |share: f64| (over_length + share * environment * environment).sqrt();
     // A mean of five has a fifth of the variance of a reading, s a quarter; E↑ compares two means, M two means of ten.
-    near(figures.systematic_forward.unwrap(), with(0.4));
-    near(figures.mean_range.unwrap(), with(0.2));
-    near(figures.accuracy_forward.unwrap(), with(2.0 * (0.2 + 4.0 / 4.0)));
-    near(figures.repeatability_forward.unwrap(), 2.0 * environment);
-    near(figures.reversal.unwrap(), 0.4_f64.sqrt() * environment);
-    near(figures.mean_reversal.unwrap(), (0.4_f64 / 11.0).sqrt() * environment);
+    near(expanded("systematic_forward"), with(0.4));
+    near(expanded("mean_range"), with(0.2));
+    near(expanded("accuracy_forward"), with(2.0 * (0.2 + 4.0 / 4.0)));
+    near(expanded("repeatability_forward"), 2.0 * environment);
+    near(expanded("reversal"), 0.4_f64.sqrt() * environment);
+    near(expanded("mean_reversal"), (0.4_f64 / 11.0).sqrt() * environment);
 }
 
 /// The scatter of the figures of tests that are read with such errors.
@@ -271,17 +279,18 @@ fn expanded_uncertainties_are_those_of_the_closed_form() {
 fn expanded_uncertainties_are_the_scatter_of_simulated_tests() {
     let mut random = Pcg64::seed_from_u64(9);
     let folder = Folder::new();
-    let stated = positioning_of(&folder, &axis_data(&mut || 0.0, 0.0)).uncertainty.unwrap();
+    let of_axis = positioning_of(&folder, &axis_data(&mut || 0.0, 0.0)).read;
+    let stated = of_axis.uncertainty.unwrap();
     let over_length = [stated.device, stated.misalignment, stated.temperature, stated.expansion, stated.setup];
-    let of: [fn(&Figures) -> Option<f64>; 8] = [
-        |f| f.accuracy,
-        |f| f.accuracy_forward,
-        |f| f.systematic,
-        |f| f.systematic_backward,
-        |f| f.mean_range,
-        |f| f.repeatability,
-        |f| f.reversal,
-        |f| f.mean_reversal,
+    let of = [
+        "accuracy",
+        "accuracy_forward",
+        "systematic",
+        "systematic_backward",
+        "mean_range",
+        "repeatability",
+        "reversal",
+        "mean_reversal",
     ];
     const DRAWS: usize = 400;
     let mut drawn = vec![Vec::with_capacity(DRAWS); of.len()];
@@ -289,13 +298,13 @@ fn expanded_uncertainties_are_the_scatter_of_simulated_tests() {
         let length: f64 = over_length.iter().map(|expanded| 0.5 * expanded * normal(&mut random)).sum();
         let data = axis_data(&mut || 0.5 * stated.environment * normal(&mut random), length);
         let test = positioning_of(&folder, &data);
-        of.iter().zip(&mut drawn).for_each(|(of, drawn)| drawn.push(of(&test.figures).unwrap()));
+        of.iter().zip(&mut drawn).for_each(|(id, drawn)| drawn.push(value(&test.read.figures, id).unwrap()));
     }
     for (number, (of, drawn)) in of.iter().zip(&drawn).enumerate() {
         let count = DRAWS as f64;
         let mean = drawn.iter().sum::<f64>() / count;
         let deviation = (drawn.iter().map(|one| (one - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
-        let u = 0.5 * of(&stated.figures).unwrap();
+        let u = find(&of_axis.figures, of).unwrap().u.unwrap();
         println!("figure {number}: u {u:.4}, scatter {deviation:.4}");
         // Four standard deviations of a standard deviation.
         assert!((deviation / u - 1.0).abs() < 4.0 / (2.0 * count).sqrt(), "{number}: {deviation}, stated {u}");

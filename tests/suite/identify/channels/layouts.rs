@@ -109,8 +109,12 @@ fn straightness_is_the_range_about_a_line() {
     let result = fit::report(&problem, &found).unwrap();
     let [figures] = &result.straightness[..] else { panic!("{:?}", result.straightness) };
     assert_eq!((figures.axis.as_str(), figures.channel.as_str(), figures.positions.len()), ("X", "vertical", 31));
-    for um in [figures.least_squares_um, figures.end_points_um] {
-        assert!((um - 0.625).abs() < 1e-6, "{um}");
+    assert_eq!(
+        figures.figures.iter().map(|figure| figure.definition.id).collect::<Vec<_>>(),
+        ["least_squares", "end_points"]
+    );
+    for figure in &figures.figures {
+        assert!((figure.value - 0.625).abs() < 1e-6 && figure.unit == "um", "{figure:?}");
     }
     assert!((figures.positions[15].end_points_um + 0.625).abs() < 1e-6);
 }

@@ -1,5 +1,7 @@
 //! Figures of standards of a linear axis and of an axis that carries the table.
 
+use abbe::identify::figure::find;
+
 use super::*;
 
 /// The linear axis of the European Spallation Source: nine positions, five cycles. Its own report prints M and A.
@@ -36,9 +38,10 @@ fn the_figures_of_a_linear_axis_are_those_of_its_report() {
     let (problem, found) = prepare(&session, 1).unwrap();
     let result = fit::report(&problem, &found).unwrap();
     let [figures] = &result.positioning[..] else { panic!("{:?}", result.positioning) };
-    assert_eq!((figures.axis.as_str(), figures.unit.as_str(), figures.positions.len()), ("X", "um", 9));
-    assert_eq!(format!("{:.2}", figures.figures.mean_range.unwrap()), "93.65");
-    assert_eq!(format!("{:.2}", figures.figures.accuracy.unwrap()), "135.27");
+    assert_eq!((figures.axis.as_str(), figures.read.unit.as_str(), figures.read.positions.len()), ("X", "um", 9));
+    let value = |id: &str| find(&figures.read.figures, id).unwrap().value;
+    assert_eq!(format!("{:.2}", value("mean_range")), "93.65");
+    assert_eq!(format!("{:.2}", value("accuracy")), "135.27");
 }
 
 /// A table axis: what is read against the table falls where the axis rises. A laser along −X, a positioning error of the
@@ -73,7 +76,7 @@ fn the_figures_of_an_axis_that_carries_the_table_have_the_sign_of_its_deviations
     // What the axis does not move has no figures.
     let [of_x, of_c] = &found[..] else { panic!("{found:?}") };
     let mean = |test: &abbe::identify::positioning::PositioningTest, place: usize| {
-        let position = &test.positions[place];
+        let position = &test.read.positions[place];
         [position.forward.unwrap().mean, position.backward.unwrap().mean]
     };
     let near = |found: [f64; 2], expected: [f64; 2]| {
@@ -81,7 +84,7 @@ fn the_figures_of_an_axis_that_carries_the_table_have_the_sign_of_its_deviations
     };
     near(mean(of_x, 10), [3.0, 2.0]);
     near(mean(of_x, 0), [0.0, -1.0]);
-    assert!((of_x.figures.mean_reversal.unwrap() - 1.0).abs() < 1e-3);
+    assert!((find(&of_x.read.figures, "mean_reversal").unwrap().value - 1.0).abs() < 1e-3);
     near(mean(of_c, 10), [5.0, 5.0]);
-    assert_eq!((of_c.unit.as_str(), of_c.position_unit.as_str()), ("arcsec", "deg"));
+    assert_eq!((of_c.read.unit.as_str(), of_c.read.position_unit.as_str()), ("arcsec", "deg"));
 }
