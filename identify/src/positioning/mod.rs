@@ -114,7 +114,7 @@ fn of_test(session: &Session, test: &Test, left_out: &[bool]) -> Option<Position
     Some(PositioningTest {
         test: test.name.clone(),
         axis: machine.axes[axis].name.clone(),
-        read: Deviations::of(test, unit.name().to_string(), kind.unit(), positions, length_mm),
+        read: Deviations::of(test, unit.name().to_string(), kind.unit().name(), positions, length_mm),
     })
 }
 
