@@ -23,7 +23,7 @@ mod results;
 mod suggest;
 
 use abbe_model::session::Session;
-
+use abbe_model::unit::{RAD_PER_ARCSEC, Unit};
 use abbe_model::words::first_of;
 pub use pulls::{Pull, Pulls};
 pub use results::{Conflict, ConflictKind, Plausibility, Suggestion, SuggestionKind};
@@ -33,7 +33,6 @@ use crate::fit::{Fit, ratio_of_another_unit};
 use crate::heldout::{rms_by_unit_mm, rms_mm};
 use crate::noise::NoiseSource;
 use crate::problem::Problem;
-use abbe_model::unit::{RAD_PER_ARCSEC, Unit};
 
 /// Share of the variance of the measured positions that a model of poses explains at least.
 const MIN_EXPLAINED: f64 = 0.99;
