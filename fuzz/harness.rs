@@ -8,7 +8,7 @@ use std::io::Write;
 use std::path::Path;
 
 use abbe_files::ReadOptions;
-use abbe_model::ModelError;
+use abbe_model::Diagnostic;
 use abbe_model::document::edit::SessionText;
 use abbe_model::session::{Session, planned};
 
@@ -49,7 +49,7 @@ fn put(folder: &Path, name: &str, contents: &[u8]) {
 
 /// Asserts that a message is not empty and that its span is a range of characters of the file, which the command
 /// prints.
-fn check_message(fault: &ModelError) {
+fn check_message(fault: &Diagnostic) {
     assert!(!fault.to_string().is_empty());
     let Some(location) = fault.location() else { return };
     let Some(span) = &location.span else { return };

@@ -2,10 +2,10 @@
 
 use abbe_codegen::Variable;
 use abbe_files::{ReadOptions, Source, SourceMap};
+use abbe_model::Diagnostic;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::effect::{Component, Effect};
-use abbe_model::error::ModelError;
 use abbe_model::instrument::InstrumentParameter;
 use abbe_model::pattern;
 use abbe_model::session::{Session, Test};
@@ -17,7 +17,7 @@ pub const WITHOUT_READINGS: &str = "the equation is made without readings: in a 
 ///
 /// # Errors
 /// If the session cannot be read without its readings either.
-pub fn session(source: &Source, options: &ReadOptions) -> Result<(Session, SourceMap, Option<ModelError>), ModelError> {
+pub fn session(source: &Source, options: &ReadOptions) -> Result<(Session, SourceMap, Option<Diagnostic>), Diagnostic> {
     let fault = match abbe_files::session_of(source, options) {
         Ok((session, sources)) => return Ok((session, sources, None)),
         Err(fault) => fault,

@@ -1,9 +1,9 @@
 //! The calibrated machine for other programs and for controls: one line of a registry for each format.
 
-use abbe_apply::ApplyError;
 use abbe_apply::compensation::curves::of_model;
 use abbe_apply::compensation::{self, Compensation, MAX_POINTS, TableFormat};
 use abbe_apply::control::{CONTROLS, Control, Kinematics};
+use abbe_apply::error::unrepresentable;
 use abbe_apply::export::dh::{self, DhTable, DhUncertainty};
 use abbe_apply::export::entries::{Remaining, best_locations};
 use abbe_apply::export::kinematics::{ENTRIES, EntryChoice, KinematicTable};
@@ -12,9 +12,10 @@ use abbe_apply::export::travel::Travel;
 use abbe_apply::export::{left_out, urdf, urdf_patch};
 use abbe_files::Source;
 use abbe_files::robot::dh::{self as table, Convention};
-use abbe_identify::IdentifyError;
+use abbe_identify::error;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::parameters::Role;
+use abbe_model::Diagnostic;
 use abbe_model::component::{ErrorKind, ErrorName};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -35,7 +36,7 @@ pub struct ExportFormat {
 
 enum Form {
     /// A description of the machine.
-    Description(fn(&IdentifiedModel, &ExportOptions) -> Result<Exported, ApplyError>),
+    Description(fn(&IdentifiedModel, &ExportOptions) -> Result<Exported, Diagnostic>),
     /// What a control takes.
     Control(&'static Control),
     /// The compensation tables of a control.
@@ -167,23 +168,23 @@ pub struct ExportResult {
 ///
 /// # Errors
 /// If there is none.
-pub fn entries(word: &str) -> Result<EntryChoice, ApplyError> {
+pub fn entries(word: &str) -> Result<EntryChoice, Diagnostic> {
     let known = ENTRIES.map(|(_, word, _)| word);
     ENTRIES
         .iter()
         .find(|(_, own, _)| *own == word)
         .map(|(choice, ..)| *choice)
-        .ok_or_else(|| IdentifyError::unknown("the export", "choice of entries", word, "the choices are", known).into())
+        .ok_or_else(|| error::unknown("the export", "choice of entries", word, "the choices are", known))
 }
 
 /// The format of this word.
 ///
 /// # Errors
 /// If there is none.
-pub fn format(word: &str) -> Result<ExportFormat, ApplyError> {
+pub fn format(word: &str) -> Result<ExportFormat, Diagnostic> {
     formats().into_iter().find(|format| format.word == word).ok_or_else(|| {
         let known = formats().into_iter().map(|format| format.word);
-        IdentifyError::unknown("the export", "format", word, "the formats are", known).into()
+        error::unknown("the export", "format", word, "the formats are", known)
     })
 }
 
@@ -219,7 +220,7 @@ impl ExportFormat {
     ///
     /// # Errors
     /// If the format cannot hold the model.
-    pub fn export(&self, model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, ApplyError> {
+    pub fn export(&self, model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, Diagnostic> {
         match &self.form {
             Form::Description(write) => write(model, options),
             Form::Control(Control { kinematics: Kinematics::Locations, tables: Some(format), .. }) => {
@@ -231,12 +232,12 @@ impl ExportFormat {
     }
 }
 
-fn written(table: &Table) -> Result<Vec<u8>, IdentifyError> {
-    csv::text(table).map_err(|why| IdentifyError::Write { what: "the table", cause: std::io::Error::other(why) })
+fn written(table: &Table) -> Result<Vec<u8>, Diagnostic> {
+    csv::text(table).map_err(|why| error::not_written("the table", why))
 }
 
 /// A table under its header.
-fn tabled(header: String, table: Table, result: ExportResult) -> Result<Exported, ApplyError> {
+fn tabled(header: String, table: Table, result: ExportResult) -> Result<Exported, Diagnostic> {
     Ok(Exported {
         contents: Contents::File([header.into_bytes(), written(&table)?].concat()),
         table: Some(table),
@@ -244,7 +245,7 @@ fn tabled(header: String, table: Table, result: ExportResult) -> Result<Exported
     })
 }
 
-fn of_urdf(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, ApplyError> {
+fn of_urdf(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, Diagnostic> {
     let tool_mm = if options.patch.is_some() { model.tool_mm } else { options.tool_mm };
     let (_, remaining) = best_locations(model, tool_mm)?;
     let result = ExportResult { left_out: left_out(model), remaining, ..ExportResult::default() };
@@ -255,14 +256,14 @@ fn of_urdf(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported,
     Ok(Exported { contents: Contents::File(text.into_bytes()), table: None, result })
 }
 
-fn of_table(model: &IdentifiedModel, _: &ExportOptions) -> Result<Exported, ApplyError> {
+fn of_table(model: &IdentifiedModel, _: &ExportOptions) -> Result<Exported, Diagnostic> {
     let axes = neutral::places(model)?;
     let table = present::places(&axes);
     let result = ExportResult { axes, left_out: left_out(model), ..ExportResult::default() };
     tabled(present::places_header(), table, result)
 }
 
-fn of_dh(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, ApplyError> {
+fn of_dh(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, Diagnostic> {
     let own = options.dh.as_ref().map(|source| table::read(source, options.convention)).transpose()?;
     let found = dh::tables(model, options.tool_mm, options.convention, own.as_ref())?;
     let table = present::dh(&found);
@@ -280,7 +281,7 @@ fn of_dh(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, A
     tabled(stated + &present::dh_header(&table), table, result)
 }
 
-fn of_control(model: &IdentifiedModel, control: &Control, options: &ExportOptions) -> Result<Exported, ApplyError> {
+fn of_control(model: &IdentifiedModel, control: &Control, options: &ExportOptions) -> Result<Exported, Diagnostic> {
     let found = control.kinematic_table(model, options.entries, &options.travel, options.tool_mm)?;
     let left_out = found.left_out.clone();
     let (header, table) = (present::kinematics_header(&found), present::kinematics(&found));
@@ -288,7 +289,7 @@ fn of_control(model: &IdentifiedModel, control: &Control, options: &ExportOption
 }
 
 /// The location errors in a format of compensation tables, and what it does not hold.
-fn of_locations(model: &IdentifiedModel, format: &TableFormat) -> Result<Exported, ApplyError> {
+fn of_locations(model: &IdentifiedModel, format: &TableFormat) -> Result<Exported, Diagnostic> {
     let errors = model.parameters.iter().enumerate().filter(|(_, parameter)| parameter.role == Role::Error);
     let named = errors
         .filter(|(index, _)| model.is_estimated(*index))
@@ -298,25 +299,25 @@ fn of_locations(model: &IdentifiedModel, format: &TableFormat) -> Result<Exporte
     let tables = compensation::tables(&model.machine, &compensation, format, MAX_POINTS);
     let file = tables.files.into_iter().next();
     let holds = "it holds location errors, and the model has none of these";
-    let (_, text) = file.ok_or_else(|| ApplyError::unrepresentable("the format", "the model", holds))?;
+    let (_, text) = file.ok_or_else(|| unrepresentable("the format", "the model", holds))?;
     let result = ExportResult { left_out: tables.left_out, ..ExportResult::default() };
     Ok(Exported { contents: Contents::File(text.into_bytes()), table: None, result })
 }
 
 /// The error motions as compensation tables with a number of places along each axis, and their standard uncertainty.
-fn of_tables(model: &IdentifiedModel, format: &TableFormat, options: &ExportOptions) -> Result<Exported, ApplyError> {
+fn of_tables(model: &IdentifiedModel, format: &TableFormat, options: &ExportOptions) -> Result<Exported, Diagnostic> {
     let places = options.places.unwrap_or(PLACES);
     if !(2..=MAX_POINTS).contains(&places) {
         let found = format!("a number from 2 to {MAX_POINTS} is expected");
         let expected = "the maximum is that of LinuxCNC and Heidenhain";
-        return Err(IdentifyError::not_applicable(format!("a table of {places} places"), found, expected).into());
+        return Err(error::not_applicable(format!("a table of {places} places"), found, expected));
     }
     let found = compensation::tables(&model.machine, &of_model(model, &options.references)?, format, places);
     if found.files.is_empty() {
         let all = found.left_out.iter().map(|line| format!("\n  {line}")).collect::<String>();
         let holds = "declare error motions as [[effect]], as `abbe trace --write` does, and fit again";
         let found = "no error can be compensated in this format";
-        return Err(IdentifyError::not_applicable("the model", found, format!("{holds}{all}")).into());
+        return Err(error::not_applicable("the model", found, format!("{holds}{all}")));
     }
     let mut files: Vec<(String, Vec<u8>)> =
         found.files.into_iter().map(|(name, text)| (name, text.into_bytes())).collect();

@@ -20,12 +20,14 @@ use abbe_files::import::session::{Draft, SESSION_FILE};
 use abbe_files::import::{ColumnFound, Foreign, Hint, Reading, Source, Understood, instrument};
 use abbe_files::read::machine_with_bodies;
 use abbe_files::store::Store;
+use abbe_identify::error::{self, CONTRADICTED};
+use abbe_identify::fit;
 use abbe_identify::plausibility::{self, ConflictKind, Plausibility};
 use abbe_identify::start::with_targets;
-use abbe_identify::{IdentifyError, fit};
-use abbe_model::ModelError;
+use abbe_model::Diagnostic;
+use abbe_model::diagnostic::FOREIGN_FILE;
+use abbe_model::diagnostic::Location;
 use abbe_model::document::node::Node;
-use abbe_model::error::Location;
 use abbe_model::instrument::{Fault, InstrumentKind};
 use abbe_model::session::Session;
 use schemars::JsonSchema;
@@ -141,12 +143,12 @@ pub struct ImportedColumn {
 ///
 /// # Errors
 /// If a file cannot be understood, or the readings contradict the machine: what was found, and what to do.
-pub fn import(files: &[Foreign], target: Target<'_>, options: &ImportOptions) -> Result<Imported, IdentifyError> {
+pub fn import(files: &[Foreign], target: Target<'_>, options: &ImportOptions) -> Result<Imported, Diagnostic> {
     let names: Vec<String> = files.iter().map(Foreign::stem).collect();
     for (place, name) in names.iter().enumerate() {
         if names[..place].iter().any(|other| other.to_lowercase() == name.to_lowercase()) {
             let found = format!("two files are named {name}");
-            return Err(IdentifyError::not_applicable("import", found, "each is the test of its name"));
+            return Err(error::not_applicable("import", found, "each is the test of its name"));
         }
     }
     let read_options =
@@ -155,7 +157,7 @@ pub fn import(files: &[Foreign], target: Target<'_>, options: &ImportOptions) ->
         Target::Session(file) => Draft::of_session(file, &read_options, &names, options.like.as_deref(), &options.set)?,
         Target::Machine(file) => {
             let Some(first) = files.first() else {
-                return Err(IdentifyError::TooFew { purpose: "an import", what: "file", least: 1, found: 0 });
+                return Err(error::too_few("an import", "file", 1, 0));
             };
             let kind = match options.kind {
                 Some(kind) => kind,
@@ -202,29 +204,28 @@ pub fn import(files: &[Foreign], target: Target<'_>, options: &ImportOptions) ->
 
 /// What an error of [`import()`] lacks, as `bar_mm=100`, if it is one of the session that would be written, which lacks a key or
 /// has a wrong one.
-pub fn key_of_new_session(error: &IdentifyError) -> Option<String> {
-    let place = if let IdentifyError::Model(cause) = error { cause.location() } else { None };
-    place.filter(|place| place.file == Path::new(SESSION_FILE))?;
+pub fn key_of_new_session(error: &Diagnostic) -> Option<String> {
+    error.location().filter(|place| place.file == Path::new(SESSION_FILE))?;
     let said = error.to_string();
     let key = said.split_once("no `").and_then(|(_, key)| key.split_once('`')).map(|(key, _)| key);
     Some(key.filter(|key| *key != "bar_mm").map_or("bar_mm=100".to_string(), |key| format!("{key}=VALUE")))
 }
 
 /// The error of a fault of a file.
-fn of_file(name: &str, (message, help): Fault) -> IdentifyError {
-    ModelError::Foreign { location: Location::file(Path::new(name)), message, help }.into()
+fn of_file(name: &str, (message, help): Fault) -> Diagnostic {
+    Diagnostic { code: FOREIGN_FILE, ..Diagnostic::input(Location::file(Path::new(name)), message, help) }
 }
 
 /// The way to read a file that the nominal machine explains best. Ways of which one cannot be read are none.
 ///
 /// # Errors
 /// If the nominal machine explains another way as well.
-fn best(draft: &Draft, test: &str, file: &Foreign, found: &Understood) -> Result<Reading, IdentifyError> {
+fn best(draft: &Draft, test: &str, file: &Foreign, found: &Understood) -> Result<Reading, Diagnostic> {
     if let [only] = &found.readings[..] {
         return Ok(only.clone());
     }
     let mut tried: Vec<(f64, f64, &Reading)> = Vec::new();
-    let mut refused: Option<ModelError> = None;
+    let mut refused: Option<Diagnostic> = None;
     for reading in &found.readings {
         let mut draft = draft.clone();
         let session = draft.apply(test, file, reading).and_then(|_| draft.read_alone(test));
@@ -240,8 +241,8 @@ fn best(draft: &Draft, test: &str, file: &Foreign, found: &Understood) -> Result
     }
     tried.sort_by(|(a, ..), (b, ..)| a.total_cmp(b));
     match (&tried[..], refused) {
-        ([], Some(error)) => Err(error.into()),
-        ([], None) => Err(IdentifyError::NoReadings),
+        ([], Some(error)) => Err(error),
+        ([], None) => Err(error::no_readings()),
         ([(misfit, _, reading), (second, most, other), ..], _)
             if *second < most.min(AS_WELL * misfit.max(f64::MIN_POSITIVE)) =>
         {
@@ -285,7 +286,7 @@ fn checked(
     nominal_misfit: Option<f64>,
     allow_implausible: bool,
     warnings: &mut Vec<String>,
-) -> Result<Plausibility, IdentifyError> {
+) -> Result<Plausibility, Diagnostic> {
     let explained = nominal_misfit.is_some_and(|misfit| misfit < max_misfit(session));
     let stated = match is_two_sided(session) {
         true => session.clone(),
@@ -298,7 +299,7 @@ fn checked(
             found.conflicts.retain(|conflict| conflict.kind != ConflictKind::Unit || session.noise_mm.is_some());
             found
         }
-        Err(error @ IdentifyError::Contradicted { .. }) if !allow_implausible && !explained => return Err(error),
+        Err(error) if error.code == CONTRADICTED && !allow_implausible && !explained => return Err(error),
         Err(error) => {
             warnings.push(format!("the session is not fitted yet: {error}"));
             Plausibility::default()
@@ -325,7 +326,7 @@ fn checked(
         .map(|conflict| conflict.words.as_str())
         .take(MAX_NAMED)
         .collect();
-    Err(IdentifyError::Contradicted { found: conflicts.join("; "), diagnosis })
+    Err(error::contradicted(conflicts.join("; "), diagnosis))
 }
 
 /// Largest number of contradictions that a refusal names.

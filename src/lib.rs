@@ -89,9 +89,9 @@ pub mod prelude {
     pub use abbe_identify::quantity::Given;
     pub use abbe_identify::results::{Estimate, FitResult, TraceResult};
     pub use abbe_identify::simulate::{Simulated, Simulation, simulate};
+    pub use abbe_model::Diagnostic;
     pub use abbe_model::chain::Machine;
     pub use abbe_model::component::ErrorName;
-    pub use abbe_model::error::ModelError;
     pub use abbe_model::instrument::InstrumentKind;
     pub use abbe_model::session::Session;
     pub use abbe_plan::{PlanOptions, analyse};
@@ -101,8 +101,8 @@ pub mod prelude {
     /// Reads a session file and the machine and data that it names.
     ///
     /// # Errors
-    /// [`ModelError`] with file, line and key of what cannot be used.
-    pub fn read_session(file: impl AsRef<Path>) -> Result<Session, ModelError> {
+    /// [`Diagnostic`] with file, line and key of what cannot be used.
+    pub fn read_session(file: impl AsRef<Path>) -> Result<Session, Diagnostic> {
         abbe_files::session(file.as_ref(), &abbe_files::ReadOptions::default())
     }
 }

@@ -20,5 +20,3 @@ pub mod export;
 pub mod geometric;
 pub mod history;
 pub mod volumetric;
-
-pub use error::ApplyError;

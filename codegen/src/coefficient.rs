@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::driver::Driver;
@@ -10,7 +11,7 @@ use abbe_model::effect::{Component, Effect};
 use abbe_model::instrument::InstrumentParameter;
 use abbe_model::unit::InternalUnit;
 
-use crate::error::CodegenError;
+use crate::error;
 
 /// A coefficient of an effect.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,19 +38,19 @@ impl Coefficient {
         effects: &[Effect],
         machine: &Machine,
         unknowns: &[InstrumentParameter],
-    ) -> Result<Vec<Coefficient>, CodegenError> {
+    ) -> Result<Vec<Coefficient>, Diagnostic> {
         let mut coefficients = Vec::new();
         for (earlier, effect) in effects.iter().enumerate() {
             if effects[..earlier].contains(effect) {
-                return Err(CodegenError::Twice { name: effect.id() });
+                return Err(error::twice(effect.id()));
             }
             let count = effect.shape.coefficients();
             if count > MAX_COEFFICIENTS {
-                return Err(CodegenError::EffectTooLong {
-                    effect: effect.id(),
-                    coefficients: count,
-                    most: MAX_COEFFICIENTS,
-                });
+                return Err(Diagnostic::equation(format!(
+                    "the effect `{}` has {count} coefficients, more than the limit of {MAX_COEFFICIENTS}; give its shape \
+                     fewer intervals, steps or powers, or omit it by naming the errors to keep",
+                    effect.id()
+                )));
             }
             let component = unit_of_component(effect, machine, unknowns)?;
             let same_kind = match &effect.driver {
@@ -113,26 +114,26 @@ fn unit_of_component(
     effect: &Effect,
     machine: &Machine,
     unknowns: &[InstrumentParameter],
-) -> Result<Option<InternalUnit>, CodegenError> {
+) -> Result<Option<InternalUnit>, Diagnostic> {
     let unit = effect.component.unit(unknowns);
     match &effect.component {
         Component::Axis(name) if machine.axis_index(&name.axis).is_none() => {
-            Err(CodegenError::no_axis(machine, effect.id(), &name.axis))
+            Err(error::no_axis(machine, effect.id(), &name.axis))
         }
-        Component::Instrument { .. } if unit.is_none() => Err(CodegenError::NoSuchParameter {
-            parameter: format!("`{}` of the effect `{}`", effect.component, effect.id()),
-        }),
-        Component::Reading(test) => Err(CodegenError::EffectWithoutForm {
-            effect: effect.id(),
-            why: format!("it adds to the readings of {test} and is not part of the chain"),
-        }),
+        Component::Instrument { .. } if unit.is_none() => {
+            Err(error::no_parameter(format!("`{}` of the effect `{}`", effect.component, effect.id())))
+        }
+        Component::Reading(test) => Err(error::effect_without_form(
+            effect.id(),
+            format!("it adds to the readings of {test} and is not part of the chain"),
+        )),
         _ => Ok(unit),
     }
 }
 
 /// Whether the axis is rotary.
-fn is_rotary(machine: &Machine, effect: &Effect, axis: &str) -> Result<bool, CodegenError> {
+fn is_rotary(machine: &Machine, effect: &Effect, axis: &str) -> Result<bool, Diagnostic> {
     let index = machine.axis_index(axis);
-    let index = index.ok_or_else(|| CodegenError::no_axis(machine, effect.id(), axis))?;
+    let index = index.ok_or_else(|| error::no_axis(machine, effect.id(), axis))?;
     Ok(machine.axes[index].kind == AxisKind::Rotary)
 }

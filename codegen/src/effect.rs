@@ -3,13 +3,14 @@
 //! The coefficients `k_i` are parameters like errors. The driver stays a symbol: the position of an axis, or a
 //! [`DriverQuantity`]. The basis functions `b_i` are those of the fit, evaluated over symbols.
 
+use abbe_model::Diagnostic;
 use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::driver::{Driver, DriverQuantity, DriverSample, SymbolInput};
 use abbe_model::effect::{Component, Effect};
 use abbe_model::instrument::InstrumentParameter;
 use abbe_model::scalar::Nominal;
 
-use crate::error::CodegenError;
+use crate::error;
 use crate::variable::Variable;
 
 /// Positions of the axes, and which axes the test holds fixed; those have no direction and no rate.
@@ -25,7 +26,7 @@ impl<N: Nominal> AxisStates<'_, N> {
         &self,
         effect: &Effect,
         nominal: &impl Fn(Variable) -> N,
-    ) -> Result<DriverSample<N>, CodegenError> {
+    ) -> Result<DriverSample<N>, Diagnostic> {
         let input = SymbolInput {
             machine: self.machine,
             state: self.state,
@@ -37,13 +38,13 @@ impl<N: Nominal> AxisStates<'_, N> {
         let named = |quantity: DriverQuantity| nominal(Variable::Driver(quantity));
         let sample = effect.driver.symbols(&input, &named);
         sample.ok_or_else(|| match &effect.driver {
-            Driver::Axis(name) => CodegenError::no_axis(self.machine, effect.id(), name),
+            Driver::Axis(name) => error::no_axis(self.machine, effect.id(), name),
             driver => {
                 let axis = input.component_axis.map(|axis| self.machine.axes[axis].kind);
                 let fault = driver.kind().check_component(&effect.component.to_string(), axis).err();
                 let why =
                     fault.map_or_else(|| format!("the driver {driver} has no symbol here"), |fault| fault.message);
-                CodegenError::EffectWithoutForm { effect: effect.id(), why }
+                error::effect_without_form(effect.id(), why)
             }
         })
     }

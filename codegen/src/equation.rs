@@ -1,5 +1,6 @@
 //! Closed-form equation of a reading: the symbolic result of the chain, with everything that the printers need.
 
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
@@ -7,7 +8,7 @@ use abbe_model::effect::Shape;
 use abbe_model::instrument::channel::{self, Channel};
 
 use crate::coefficient::Coefficient;
-use crate::error::CodegenError;
+use crate::error;
 use crate::factored;
 use crate::form::{Arrangement, Form, Kind, Options, Order};
 use crate::program::{Input, Label, Naming, Program};
@@ -75,7 +76,7 @@ impl Equation {
         source: &impl Source,
         errors: &[ErrorName],
         options: &Options,
-    ) -> Result<Equation, CodegenError> {
+    ) -> Result<Equation, Diagnostic> {
         let mut machine = machine.clone();
         machine.rotation = options.rotation.unwrap_or(machine.rotation);
         let arena = Arena::new();
@@ -112,7 +113,7 @@ impl Equation {
             }
             Order::First if options.arrangement == Arrangement::Groups => {
                 let why = "does not exist in first order; use the form frames or single".to_string();
-                return Err(CodegenError::NoSuchForm { form: "groups", why });
+                return Err(error::no_form("groups", why));
             }
             Order::Bilinear => truncation::bilinear(&run, &exact, &mut vectors, &written)?,
             Order::First => truncation::first(&run, &exact, &mut vectors, &written)?,
@@ -165,7 +166,7 @@ impl Equation {
     ///
     /// # Errors
     /// If the machine lacks the axis of an error.
-    pub fn volumetric(machine: &Machine, errors: &[ErrorName], options: &Options) -> Result<Equation, CodegenError> {
+    pub fn volumetric(machine: &Machine, errors: &[ErrorName], options: &Options) -> Result<Equation, Diagnostic> {
         Equation::of(machine, &ToolPoint, errors, options)
     }
 
@@ -257,12 +258,11 @@ fn parameters(
     source: &impl Source,
     errors: &[ErrorName],
     options: &Options,
-) -> Result<Vec<Variable>, CodegenError> {
+) -> Result<Vec<Variable>, Diagnostic> {
     let known = source.subject(&|name: &str| length(arena, name)).unknowns();
     let mut parameters: Vec<Variable> = errors.iter().cloned().map(Variable::Error).collect();
     for index in &options.unknowns {
-        let unknown =
-            known.get(*index).ok_or_else(|| CodegenError::NoSuchParameter { parameter: format!("number {index}") })?;
+        let unknown = known.get(*index).ok_or_else(|| error::no_parameter(format!("number {index}")))?;
         parameters.push(Variable::Instrument(*unknown));
     }
     let coefficients = Coefficient::of_effects(&options.effects, machine, known)?;
@@ -270,7 +270,7 @@ fn parameters(
     // Naming them here fixes their order wherever terms are sorted.
     for (index, parameter) in parameters.iter().enumerate() {
         if parameters[..index].contains(parameter) {
-            return Err(CodegenError::Twice { name: parameter.name() });
+            return Err(error::twice(parameter.name()));
         }
         arena.variable(parameter.clone());
     }

@@ -1,8 +1,8 @@
 //! Evaluation of expressions over numbers: `f64`, dual numbers, a counting scalar, or other symbols.
 
+use abbe_model::Diagnostic;
 use abbe_model::scalar::{Nominal, Scalar};
 
-use crate::error::CodegenError;
 use crate::symbol::{Arena, Binary, Node, Operand, Unary};
 use crate::variable::Variable;
 
@@ -62,7 +62,7 @@ pub fn evaluate<S: Scalar>(
     arena: &Arena,
     outputs: &[Operand],
     variable: impl Fn(&Variable) -> VariableValue<S>,
-) -> Result<Vec<S>, CodegenError> {
+) -> Result<Vec<S>, Diagnostic> {
     let mut values: Vec<Option<VariableValue<S>>> = vec![None; arena.node_count()];
     let constant = |value: f64| VariableValue::<S>::Nominal(S::Nominal::constant(value));
     let normal_form_of = |values: &[Option<VariableValue<S>>], operand: Operand| match operand {
@@ -72,9 +72,11 @@ pub fn evaluate<S: Scalar>(
     for id in arena.reachable(outputs) {
         let value = match arena.node(id) {
             Node::Variable(index) => variable(&arena.variable_at(index)),
-            Node::Unary(op, a) => {
-                normal_form_of(&values, a).unary(op).ok_or(CodegenError::FunctionOfError { function: op })?
-            }
+            Node::Unary(op, a) => normal_form_of(&values, a).unary(op).ok_or_else(|| {
+                Diagnostic::equation(format!(
+                    "the function {op:?} is applied to an error; only nominal quantities are allowed"
+                ))
+            })?,
             Node::Binary(op, a, b) => normal_form_of(&values, a).binary(op, normal_form_of(&values, b)),
         };
         values[id.index()] = Some(value);
@@ -90,6 +92,6 @@ pub fn evaluate_f64(
     arena: &Arena,
     outputs: &[Operand],
     variable: impl Fn(&Variable) -> f64,
-) -> Result<Vec<f64>, CodegenError> {
+) -> Result<Vec<f64>, Diagnostic> {
     evaluate(arena, outputs, |v| VariableValue::Nominal(variable(v)))
 }

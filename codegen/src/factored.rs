@@ -13,6 +13,7 @@
 
 use std::cmp::Reverse;
 
+use abbe_model::Diagnostic;
 use abbe_model::frames::Point;
 use abbe_model::instrument::displaced;
 use abbe_model::scalar::Scalar;
@@ -20,7 +21,7 @@ use num_rational::BigRational;
 use num_traits::{One, Signed};
 
 use crate::collect::{Collector, number_of};
-use crate::error::CodegenError;
+use crate::error;
 use crate::form::Arrangement;
 use crate::normal_form::Ring;
 use crate::polynomial::{Atom, Monomial, Polynomial};
@@ -57,14 +58,14 @@ pub(crate) fn groups<'a>(
     bar: [Operand; 3],
     arrangement: Arrangement,
     written: &FormContext<'a, '_>,
-) -> Result<Vec<Tree>, CodegenError> {
+) -> Result<Vec<Tree>, Diagnostic> {
     let &FormContext { arena, inputs, whole, held, .. } = written;
     let form = arrangement.word();
     let Some(station) = run.subject.bar() else {
-        return Err(CodegenError::NoSuchForm {
+        return Err(error::no_form(
             form,
-            why: "exists for the length of a ball bar only; use the form frames, or the bilinear order".to_string(),
-        });
+            "exists for the length of a ball bar only; use the form frames, or the bilinear order",
+        ));
     };
     let mut ring = Ring::exact(arena);
     ring.keep(whole);
@@ -113,21 +114,21 @@ pub(crate) fn groups<'a>(
         let why = format!(
             "has {symbols} symbols, more than the limit of {MAX_SYMBOLS}; use the form frames, or name fewer errors"
         );
-        return Err(CodegenError::NoSuchForm { form, why });
+        return Err(error::no_form(form, why));
     }
     let operands = operands(arena, inputs);
     for (group, coordinate) in groups.iter().zip(bar) {
         if !ring.equal_to_rounding(group.symbol(arena, &operands).operand(), coordinate)? {
             let why = "is not proved equal to the chain by the normal form; use the form frames".to_string();
-            return Err(CodegenError::NoSuchForm { form, why });
+            return Err(error::no_form(form, why));
         }
     }
     Ok(groups)
 }
 
 /// The matrix and the offset of an axis: the images of the origin and of the unit vectors.
-fn affine<'a>(run: &Run<'_, Symbol<'a>>, ring: &mut Ring<'a>, axis: usize) -> Result<Affine, CodegenError> {
-    let mut image = |unit: Option<usize>| -> Result<[Polynomial; 3], CodegenError> {
+fn affine<'a>(run: &Run<'_, Symbol<'a>>, ring: &mut Ring<'a>, axis: usize) -> Result<Affine, Diagnostic> {
+    let mut image = |unit: Option<usize>| -> Result<[Polynomial; 3], Diagnostic> {
         let point = std::array::from_fn(|i| Symbol::constant(f64::from(u8::from(unit == Some(i)))));
         let [x, y, z] = run.machine.push(axis, &run.state, &run.errors, Point(point)).0;
         Ok([ring.normal_form(x.operand())?, ring.normal_form(y.operand())?, ring.normal_form(z.operand())?])
@@ -140,7 +141,7 @@ fn affine<'a>(run: &Run<'_, Symbol<'a>>, ring: &mut Ring<'a>, axis: usize) -> Re
 
 /// Splits the coordinates of a ball: one length along each axis of its frame, and everything else. Of a sum such as
 /// `H − Z` the first positive length belongs to the ball and the rest offsets the frame.
-fn split<'a>(ring: &mut Ring<'a>, ball: Point<Symbol<'a>>) -> Result<[[Sum; 3]; 2], CodegenError> {
+fn split<'a>(ring: &mut Ring<'a>, ball: Point<Symbol<'a>>) -> Result<[[Sum; 3]; 2], Diagnostic> {
     let (mut main, mut rest): ([Sum; 3], [Sum; 3]) = Default::default();
     for (coordinate, symbol) in ball.0.into_iter().enumerate() {
         let form = ring.normal_form(symbol.operand())?;

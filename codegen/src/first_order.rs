@@ -6,7 +6,8 @@
 //! L ≈ L₀ + Σ (b₀·bᵢ / L₀) eᵢ
 //! ```
 
-use crate::error::CodegenError;
+use abbe_model::Diagnostic;
+
 use crate::normal_form::Ring;
 use crate::polynomial::{Monomial, Polynomial};
 use crate::symbol::Operand;
@@ -70,7 +71,7 @@ impl FirstOrder {
         stated: Operand,
         unknowns: [Option<Operand>; 2],
         parameters: &[Variable],
-    ) -> Result<Self, CodegenError> {
+    ) -> Result<Self, Diagnostic> {
         let vector = cleaned_vector(ring, vector)?;
         let nominal = vector.each_ref().map(|component| without_errors(ring, component));
         let square = ring.cleaned(dot(ring, &nominal, &nominal));
@@ -107,7 +108,7 @@ impl FirstOrder {
         stylus: [Operand; 3],
         radius: Operand,
         parameters: &[Variable],
-    ) -> Result<Self, CodegenError> {
+    ) -> Result<Self, Diagnostic> {
         let none = Operand::constant(0.0);
         let mut form = FirstOrder::of_length(ring, stylus, none, [Some(radius), None], parameters)?;
         let radius = ring.normal_form(radius)?;
@@ -126,14 +127,17 @@ impl FirstOrder {
         [stylus, step]: [[Operand; 3]; 2],
         radius: Operand,
         parameters: &[Variable],
-    ) -> Result<Self, CodegenError> {
+    ) -> Result<Self, Diagnostic> {
         let (v, u) = (cleaned_vector(ring, stylus)?, cleaned_vector(ring, step)?);
         let r = ring.normal_form(radius)?;
         let nominal = |vector: &[Polynomial; 3]| vector.each_ref().map(|part| without_errors(ring, part));
         let (v_0, u_0, r_0) = (nominal(&v), nominal(&u), without_errors(ring, &r));
         // In floating point a unit vector has unit length only to rounding.
         if !dot(ring, &u_0, &u_0).is_about(1.0) {
-            return Err(CodegenError::ObliqueProbing);
+            return Err(Diagnostic::equation(
+                "the first order of a distance has no short form where the angle between the stated probing `direction` and \
+                 the artefact's axis changes as the axes move; use the exact or the bilinear order",
+            ));
         }
         let b = dot(ring, &v_0, &u_0);
         let c = &dot(ring, &v_0, &v_0) - &ring.product(&r_0, &r_0);
@@ -167,7 +171,7 @@ impl FirstOrder {
         ring: &mut Ring<'_>,
         coordinates: &[Operand],
         parameters: &[Variable],
-    ) -> Result<Self, CodegenError> {
+    ) -> Result<Self, Diagnostic> {
         let forms =
             coordinates.iter().map(|coordinate| ring.normal_form(*coordinate)).collect::<Result<Vec<_>, _>>()?;
         let forms = ring.without_residue(&forms);
@@ -240,7 +244,7 @@ impl FirstOrder {
 }
 
 /// The normal forms of a vector without residue.
-fn cleaned_vector(ring: &mut Ring<'_>, vector: [Operand; 3]) -> Result<[Polynomial; 3], CodegenError> {
+fn cleaned_vector(ring: &mut Ring<'_>, vector: [Operand; 3]) -> Result<[Polynomial; 3], Diagnostic> {
     let [x, y, z] = vector.map(|component| ring.normal_form(component));
     let mut forms = ring.without_residue(&[x?, y?, z?]).into_iter();
     Ok(std::array::from_fn(|_| forms.next().unwrap_or_default()))

@@ -2,10 +2,11 @@
 
 use std::collections::{BTreeSet, HashMap};
 
+use abbe_model::Diagnostic;
 use num_rational::BigRational;
 
 use crate::constant::{Exact, ROOTS};
-use crate::error::CodegenError;
+use crate::error::no_polynomial;
 use crate::polynomial::{Atom, Monomial, Polynomial};
 use crate::symbol::{Arena, Binary, Node, NodeId, Operand, Unary, VariableId, operands};
 use crate::variable::Variable;
@@ -35,9 +36,11 @@ impl<'a> Ring<'a> {
     ///
     /// # Errors
     /// If the order is above 2.
-    pub fn truncated(arena: &'a Arena, order: u32) -> Result<Self, CodegenError> {
+    pub fn truncated(arena: &'a Arena, order: u32) -> Result<Self, Diagnostic> {
         if order > 2 {
-            return Err(CodegenError::OrderTooHigh { order });
+            return Err(Diagnostic::equation(format!(
+                "order {order} in the errors is not available; the orders are first, bilinear and exact"
+            )));
         }
         Ok(Ring { order: Some(order), ..Ring::exact(arena) })
     }
@@ -103,12 +106,12 @@ impl<'a> Ring<'a> {
     ///
     /// # Errors
     /// If one of them is not a polynomial.
-    pub fn equal(&mut self, a: Operand, b: Operand) -> Result<bool, CodegenError> {
+    pub fn equal(&mut self, a: Operand, b: Operand) -> Result<bool, Diagnostic> {
         Ok(self.normal_form(a)? == self.normal_form(b)?)
     }
 
     /// Whether two expressions are equal but for the rounding of their constants.
-    pub(crate) fn equal_to_rounding(&mut self, a: Operand, b: Operand) -> Result<bool, CodegenError> {
+    pub(crate) fn equal_to_rounding(&mut self, a: Operand, b: Operand) -> Result<bool, Diagnostic> {
         let (a, b) = (self.normal_form(a)?, self.normal_form(b)?);
         Ok(self.is_residue(&(&a - &b), &[a, b]))
     }
@@ -118,7 +121,7 @@ impl<'a> Ring<'a> {
     /// # Errors
     /// If it is not a polynomial: a quotient of expressions, a root of errors, or a function of errors other than the
     /// sine or cosine of one.
-    pub fn normal_form(&mut self, operand: Operand) -> Result<Polynomial, CodegenError> {
+    pub fn normal_form(&mut self, operand: Operand) -> Result<Polynomial, Diagnostic> {
         let mut requested = BTreeSet::new();
         let mut pending = vec![operand];
         while let Some(next) = pending.pop() {
@@ -166,11 +169,10 @@ impl<'a> Ring<'a> {
         }
     }
 
-    fn of_node(&mut self, id: NodeId) -> Result<Polynomial, CodegenError> {
-        let no = |what: &str| CodegenError::NoPolynomial { what: what.to_string() };
+    fn of_node(&mut self, id: NodeId) -> Result<Polynomial, Diagnostic> {
         if self.is_function(id) {
             return if self.order.is_some() && self.contains_errors(Operand::Node(id)) {
-                Err(no("a function of errors"))
+                Err(no_polynomial("a function of errors"))
             } else {
                 Ok(Polynomial::atom(Atom::Function(id)))
             };
@@ -192,11 +194,11 @@ impl<'a> Ring<'a> {
             Node::Unary(Unary::Sqrt, a) => {
                 let radicand = self.normal_form_of(a);
                 if radicand.contains(|atom| self.is_small(atom)) {
-                    return Err(no("a root of errors"));
+                    return Err(no_polynomial("a root of errors"));
                 }
                 self.root(radicand)
             }
-            Node::Unary(..) => return Err(no("a function")),
+            Node::Unary(..) => return Err(no_polynomial("a function")),
             Node::Binary(op, a, b) => {
                 let (x, y) = (self.normal_form_of(a), self.normal_form_of(b));
                 match op {
@@ -205,7 +207,7 @@ impl<'a> Ring<'a> {
                     Binary::Mul => self.product(&x, &y),
                     Binary::Div => {
                         let divisor = b.known().filter(|divisor| *divisor != 0.0 && divisor.is_finite());
-                        let divisor = divisor.ok_or_else(|| no("a quotient of expressions"))?;
+                        let divisor = divisor.ok_or_else(|| no_polynomial("a quotient of expressions"))?;
                         self.product(&x, &inverse(divisor))
                     }
                 }
@@ -220,12 +222,10 @@ impl<'a> Ring<'a> {
     }
 
     /// The sine or cosine of a sum of errors in a truncated ring: `x` or `1 − x²/2`.
-    fn series(&self, function: Unary, angle: &Polynomial) -> Result<Polynomial, CodegenError> {
+    fn series(&self, function: Unary, angle: &Polynomial) -> Result<Polynomial, Diagnostic> {
         let mut terms = angle.terms();
         if !terms.all(|(monomial, _)| monomial.degree(|atom| self.is_small(atom)) > 0) {
-            return Err(CodegenError::NoPolynomial {
-                what: "the sine of a sum of an error and a nominal quantity".to_string(),
-            });
+            return Err(no_polynomial("the sine of a sum of an error and a nominal quantity"));
         }
         if function == Unary::Sin {
             return Ok(angle.clone());

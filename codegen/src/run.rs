@@ -1,5 +1,6 @@
 //! Evaluation of the chain, over symbols for the equation and over numbers for its check.
 
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::frames::{Point, SinCos};
@@ -9,7 +10,7 @@ use abbe_model::scalar::{Nominal, Scalar};
 
 use crate::constant::ROUNDING;
 use crate::effect::AxisStates;
-use crate::error::CodegenError;
+use crate::error;
 use crate::subject::{Source, Subject};
 use crate::variable::Variable;
 
@@ -36,7 +37,7 @@ impl<'m, S: Scalar> Run<'m, S> {
         parameters: &[Variable],
         nominal: &impl Fn(Variable) -> S::Nominal,
         small: &impl Fn(usize) -> S,
-    ) -> Result<Self, CodegenError> {
+    ) -> Result<Self, Diagnostic> {
         let length = |name: &str| nominal(Variable::Length(name.to_string()));
         let subject = source.subject(&length);
         let mut held = Vec::with_capacity(machine.axes.len());
@@ -60,12 +61,12 @@ impl<'m, S: Scalar> Run<'m, S> {
             match parameter {
                 Variable::Error(name) => {
                     let slot = machine.error_slot(name);
-                    let slot = slot.ok_or_else(|| CodegenError::no_axis(machine, name.to_string(), &name.axis))?;
+                    let slot = slot.ok_or_else(|| error::no_axis(machine, name.to_string(), &name.axis))?;
                     slots[slot].push((index, None));
                 }
                 Variable::Instrument(unknown) => {
                     let slot = unknowns.iter().position(|known| known == unknown);
-                    let slot = slot.ok_or_else(|| CodegenError::NoSuchParameter { parameter: parameter.meaning() })?;
+                    let slot = slot.ok_or_else(|| error::no_parameter(parameter.meaning()))?;
                     slots[machine.error_slots() + slot].push((index, None));
                 }
                 Variable::Coefficient(coefficient) => {

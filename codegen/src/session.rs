@@ -2,15 +2,14 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use abbe_model::Diagnostic;
 use abbe_model::axis::{Axis, AxisKind};
-use abbe_model::error::ModelError;
 use abbe_model::scalar::Nominal;
 use abbe_model::session::expression::{Constant, Length};
 use abbe_model::session::motion::Motion;
 use abbe_model::session::planned;
 use abbe_model::session::{Session, Test};
 
-use crate::error::CodegenError;
 use crate::follow::{self, Following};
 use crate::subject::{Source, Subject};
 
@@ -37,7 +36,7 @@ impl<'s> SessionTest<'s> {
     ///
     /// # Errors
     /// If a planned motion is impossible.
-    pub fn new(session: &'s Session, test: &'s Test) -> Result<Self, ModelError> {
+    pub fn new(session: &'s Session, test: &'s Test) -> Result<Self, Diagnostic> {
         let range = |column: &Vec<f64>| {
             let least = column.iter().copied().fold(f64::INFINITY, f64::min);
             let greatest = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -86,14 +85,16 @@ impl<'s> SessionTest<'s> {
     ///
     /// # Errors
     /// If the machine lacks an axis.
-    pub fn with_symbols(mut self, axes: &[String]) -> Result<Self, CodegenError> {
+    pub fn with_symbols(mut self, axes: &[String]) -> Result<Self, Diagnostic> {
         let machine = &self.session.machine;
         self.symbols.fill(false);
         for name in axes {
-            let index = machine.axis_index(name).ok_or_else(|| CodegenError::NoAxisToKeep {
-                axis: name.clone(),
-                machine: machine.code(),
-                axes: machine.axes.iter().map(|axis| axis.name.as_str()).collect::<Vec<_>>().join(", "),
+            let index = machine.axis_index(name).ok_or_else(|| {
+                let axes: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
+                let (machine, axes) = (machine.code(), axes.join(", "));
+                Diagnostic::equation(format!(
+                    "`{machine}` has no axis `{name}` that could stay a symbol; its axes are {axes}"
+                ))
             })?;
             self.symbols[index] = true;
         }

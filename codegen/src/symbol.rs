@@ -18,7 +18,7 @@ use crate::variable::Variable;
 /// assert_eq!(evaluate_f64(&arena, &[hypotenuse], at)?, [5.0]);
 /// // The same expression is the same node.
 /// assert_eq!(hypotenuse, (a * a + b * b).sqrt().operand());
-/// # Ok::<(), abbe_codegen::CodegenError>(())
+/// # Ok::<(), abbe_model::Diagnostic>(())
 /// ```
 pub type Arena = abbe_model::expression::Arena<Variable>;
 /// A named symbol, or an expression of named symbols.

@@ -1,9 +1,9 @@
 //! Truncated forms: built from the normal form, arranged for printing, and put back into the arena for code.
 
+use abbe_model::Diagnostic;
 use abbe_model::scalar::Nominal;
 
 use crate::collect::Collector;
-use crate::error::CodegenError;
 use crate::first_order::{Column, FirstOrder};
 use crate::form::{Form, PrintedFirstOrder};
 use crate::normal_form::Ring;
@@ -35,7 +35,7 @@ pub(crate) fn bilinear<'a>(
     exact: &[Operand],
     vectors: &mut Vec<NamedVector>,
     written: &FormContext<'a, '_>,
-) -> Result<FormResult, CodegenError> {
+) -> Result<FormResult, Diagnostic> {
     let &FormContext { arena, inputs, .. } = written;
     let mut ring = Ring::truncated(arena, 2)?;
     ring.keep(written.whole);
@@ -76,7 +76,7 @@ pub(crate) fn first<'a>(
     exact: &[Operand],
     vectors: &mut Vec<NamedVector>,
     written: &FormContext<'a, '_>,
-) -> Result<FormResult, CodegenError> {
+) -> Result<FormResult, Diagnostic> {
     let &FormContext { arena, inputs, parameters, whole, held } = written;
     let mut ring = Ring::truncated(arena, 1)?;
     ring.keep(whole);

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
-use abbe_model::error::{Location, ModelError};
+use abbe_model::diagnostic::{Diagnostic, Location};
 use abbe_model::session::readings::{AxisTravel, Readings};
 use abbe_model::unit::Unit;
 use csv::StringRecord;
@@ -108,12 +108,10 @@ impl CommandFile {
     ///
     /// # Errors
     /// If the file cannot be read, or its header names no axis and no pose, a quantity twice, or a part of a pose.
-    pub fn open(path: &Path, machine: &Machine, at: Vec<f64>) -> Result<CommandFile, ModelError> {
+    pub fn open(path: &Path, machine: &Machine, at: Vec<f64>) -> Result<CommandFile, Diagnostic> {
         let opened = Store::Disk.open(path).and_then(|opened| Ok((opened.state()?, opened)));
-        let (state, opened) = opened.map_err(|cause| ModelError::Input {
-            location: Location::file(path),
-            message: format!("the file of commands cannot be read: {cause}"),
-            help: None,
+        let (state, opened) = opened.map_err(|cause| {
+            Diagnostic::input(Location::file(path), format!("the file of commands cannot be read: {cause}"), None)
         })?;
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
@@ -122,10 +120,12 @@ impl CommandFile {
             .from_reader(Bounded { opened, left: LONGEST_ROW });
         let mut header = StringRecord::new();
         let found = next_record(&mut reader, &mut header, path)?;
-        let fault = |message: String, help: String| ModelError::Input {
-            location: Location::line(path, header.position().map_or(1, |place| place.line() as usize)),
-            message,
-            help: Some(help),
+        let fault = |message: String, help: String| {
+            Diagnostic::input(
+                Location::line(path, header.position().map_or(1, |place| place.line() as usize)),
+                message,
+                help,
+            )
         };
         let expected = || {
             if header.len() == 1 && header.iter().any(|cell| cell.contains([';', '\t'])) {
@@ -267,7 +267,7 @@ impl CommandFile {
     ///
     /// # Errors
     /// If the file cannot be read on, or is not text.
-    pub fn next_block(&mut self, machine: &Machine, most: usize) -> Result<Option<Block>, ModelError> {
+    pub fn next_block(&mut self, machine: &Machine, most: usize) -> Result<Option<Block>, Diagnostic> {
         let has = |wanted: Role| self.meanings.contains(&Meaning::Of(wanted));
         let (time, run) = (has(Role::Time), has(Role::Run));
         let mut block = Block {
@@ -382,7 +382,7 @@ impl Row {
 }
 
 /// Reads the next row that is no comment; `false` at the end.
-fn next_record(reader: &mut csv::Reader<Bounded>, record: &mut StringRecord, path: &Path) -> Result<bool, ModelError> {
+fn next_record(reader: &mut csv::Reader<Bounded>, record: &mut StringRecord, path: &Path) -> Result<bool, Diagnostic> {
     loop {
         let found = reader.read_record(record).map_err(|cause| unreadable(path, &cause))?;
         if !found || !record.get(0).is_some_and(is_comment) {
@@ -406,11 +406,11 @@ fn meaning(machine: &Machine, name: &str, first: bool) -> Meaning {
     }
 }
 
-fn unreadable(path: &Path, cause: &csv::Error) -> ModelError {
+fn unreadable(path: &Path, cause: &csv::Error) -> Diagnostic {
     let line = cause.position().map(|place| place.line() as usize);
-    ModelError::Input {
-        location: line.map_or_else(|| Location::file(path), |line| Location::line(path, line)),
-        message: format!("the file of commands cannot be read: {cause}"),
-        help: Some("a CSV in UTF-8 with a header line is expected".into()),
-    }
+    Diagnostic::input(
+        line.map_or_else(|| Location::file(path), |line| Location::line(path, line)),
+        format!("the file of commands cannot be read: {cause}"),
+        "a CSV in UTF-8 with a header line is expected",
+    )
 }

@@ -26,7 +26,7 @@
 //! assert_eq!(names, ["A100", "A150", "C100", "C150"]);
 //! let readings = session.tests.iter().filter_map(|test| test.readings.as_ref());
 //! assert_eq!(readings.map(|readings| readings.rows()).sum::<usize>(), 2416);
-//! # Ok::<(), abbe_model::ModelError>(())
+//! # Ok::<(), abbe_model::Diagnostic>(())
 //! ```
 
 #![cfg_attr(

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use abbe_model::chain::Machine;
+use abbe_model::diagnostic::{Diagnostic, Location};
 use abbe_model::document::edit::SessionText;
 use abbe_model::document::effect;
 use abbe_model::document::fault::{Fault, Step, Within};
@@ -11,7 +12,6 @@ use abbe_model::document::node::Node;
 use abbe_model::document::session::{MachineFile, Session as Document, SessionMachine};
 use abbe_model::document::test::Test;
 use abbe_model::effect::Effect;
-use abbe_model::error::{Location, ModelError};
 use abbe_model::instrument::InstrumentParameter;
 use abbe_model::session::Session;
 use schemars::JsonSchema;
@@ -32,7 +32,7 @@ use crate::source::{Parsed, Source};
 ///
 /// # Errors
 /// If the file cannot be read or is not such a text, with its name and what to do.
-pub fn text(path: &Path, what: &str) -> Result<Source, ModelError> {
+pub fn text(path: &Path, what: &str) -> Result<Source, Diagnostic> {
     Source::read(&Store::Disk, path, what)
 }
 
@@ -40,7 +40,7 @@ pub fn text(path: &Path, what: &str) -> Result<Source, ModelError> {
 ///
 /// # Errors
 /// If the file cannot be read, or is too large.
-pub fn foreign_text(path: &Path, what: &str) -> Result<Source, ModelError> {
+pub fn foreign_text(path: &Path, what: &str) -> Result<Source, Diagnostic> {
     Source::read_foreign(&Store::Disk, path, what)
 }
 
@@ -48,7 +48,7 @@ pub fn foreign_text(path: &Path, what: &str) -> Result<Source, ModelError> {
 ///
 /// # Errors
 /// If the file cannot be read or does not describe a machine, with its line and what to do.
-pub fn machine(path: &Path) -> Result<Machine, ModelError> {
+pub fn machine(path: &Path) -> Result<Machine, Diagnostic> {
     machine_of(&machine_source(&Store::Disk, path)?)
 }
 
@@ -56,7 +56,7 @@ pub fn machine(path: &Path) -> Result<Machine, ModelError> {
 ///
 /// # Errors
 /// As [`machine()`].
-pub fn machine_of(source: &Source) -> Result<Machine, ModelError> {
+pub fn machine_of(source: &Source) -> Result<Machine, Diagnostic> {
     let options = ReadOptions::default();
     let path = source.file.as_path();
     // A text from no file has no files beside it.
@@ -67,12 +67,12 @@ pub fn machine_of(source: &Source) -> Result<Machine, ModelError> {
 /// The machine of a document in memory.
 ///
 /// # Errors
-/// If it does not describe a machine: [`ModelError::Session`], which has no place.
-pub fn machine_of_node(node: Node) -> Result<Machine, ModelError> {
+/// If it does not describe a machine; the diagnostic has no place.
+pub fn machine_of_node(node: Node) -> Result<Machine, Diagnostic> {
     machine_in(&Parsed::of_node(node), &mut BodyFiles::default())
 }
 
-fn machine_in(parsed: &Parsed<'_>, files: &mut BodyFiles<'_>) -> Result<Machine, ModelError> {
+fn machine_in(parsed: &Parsed<'_>, files: &mut BodyFiles<'_>) -> Result<Machine, Diagnostic> {
     let document: machine_document::Machine = parsed.document()?;
     lower::machine(&document, files).map_err(|fault| parsed.error_of(fault))
 }
@@ -91,14 +91,14 @@ pub struct MachineRead {
 ///
 /// # Errors
 /// As [`machine()`].
-pub fn machine_with_bodies(path: &Path, options: &ReadOptions) -> Result<MachineRead, ModelError> {
+pub fn machine_with_bodies(path: &Path, options: &ReadOptions) -> Result<MachineRead, Diagnostic> {
     let source = machine_source(&options.store, path)?;
     let mut files = BodyFiles { from: Some((path, path, options)), ..BodyFiles::default() };
     let machine = machine_in(&source.parse()?, &mut files)?;
     Ok(MachineRead { machine, bodies: files.read, source })
 }
 
-fn machine_source(store: &Store, path: &Path) -> Result<Source, ModelError> {
+fn machine_source(store: &Store, path: &Path) -> Result<Source, Diagnostic> {
     Source::read(store, path, "the machine file")
 }
 
@@ -131,7 +131,7 @@ pub fn effect_of_document(
 pub fn lowered<T: DeserializeOwned + JsonSchema, V>(
     source: &Source,
     lower: impl FnOnce(&T) -> Result<V, Fault>,
-) -> Result<V, ModelError> {
+) -> Result<V, Diagnostic> {
     let parsed = source.parse()?;
     lower(&parsed.document()?).map_err(|fault| parsed.error_of(fault))
 }
@@ -140,7 +140,7 @@ pub fn lowered<T: DeserializeOwned + JsonSchema, V>(
 ///
 /// # Errors
 /// Every fault that prevents the use of the session: file, line, what was found and expected, and what to do.
-pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError> {
+pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, Diagnostic> {
     session_with_sources(path, options).map(|(session, _)| session)
 }
 
@@ -148,7 +148,7 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
 ///
 /// # Errors
 /// As [`session`].
-pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Session, SourceMap), ModelError> {
+pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Session, SourceMap), Diagnostic> {
     session_of(&Source::read(&options.store, path, "the session file")?, options)
 }
 
@@ -156,7 +156,7 @@ pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Sessi
 ///
 /// # Errors
 /// As [`session`].
-pub fn session_of(source: &Source, options: &ReadOptions) -> Result<(Session, SourceMap), ModelError> {
+pub fn session_of(source: &Source, options: &ReadOptions) -> Result<(Session, SourceMap), Diagnostic> {
     let path = source.file.as_path();
     let parsed = source.parse()?;
     let document: Document = parsed.document()?;
@@ -178,11 +178,7 @@ pub fn session_of(source: &Source, options: &ReadOptions) -> Result<(Session, So
     };
     let found = lower::add(&mut session, (&document).into(), &surroundings).map_err(here)?;
     if session.tests.is_empty() {
-        return Err(ModelError::Input {
-            location: Location::file(path),
-            message: "a session without tests".into(),
-            help: Some("add at least one [[test]]".into()),
-        });
+        return Err(Diagnostic::input(Location::file(path), "a session without tests", "add at least one [[test]]"));
     }
     let mut files: Vec<FileStamp> = Vec::new();
     let own = source.stamp.iter().chain(machine_source.iter().filter_map(|source| source.stamp.as_ref()));
@@ -239,8 +235,8 @@ fn session_machine(path: &Path, options: &ReadOptions, document: &SessionMachine
 /// tests.
 ///
 /// # Errors
-/// [`ModelError::Session`] as for a session file, without its line.
-pub fn plan_of_node(node: Node) -> Result<Session, ModelError> {
+/// As for a session file, without its line.
+pub fn plan_of_node(node: Node) -> Result<Session, Diagnostic> {
     plan_in(&Parsed::of_node(node))
 }
 
@@ -248,11 +244,11 @@ pub fn plan_of_node(node: Node) -> Result<Session, ModelError> {
 ///
 /// # Errors
 /// As for a session file.
-pub fn plan_of(source: &Source) -> Result<Session, ModelError> {
+pub fn plan_of(source: &Source) -> Result<Session, Diagnostic> {
     plan_in(&source.parse()?)
 }
 
-fn plan_in(source: &Parsed<'_>) -> Result<Session, ModelError> {
+fn plan_in(source: &Parsed<'_>) -> Result<Session, Diagnostic> {
     let document: Document = source.document()?;
     let read = || {
         let SessionMachine::Other(tables) = &document.machine else {
@@ -294,17 +290,17 @@ fn plan_in(source: &Parsed<'_>) -> Result<Session, ModelError> {
 /// let test = json!({"name": "again", "bar_mm": 125, "workpiece_ball_mm": [0, 100, 0], "spindle_ball_mm": [0, 0, 0]});
 /// let fault = add_node(&mut session, "test", test.into(), &columns).unwrap_err();
 /// assert!(fault.to_string().contains("a bar of 125.0000 mm cannot reach between its balls"));
-/// # Ok::<(), abbe_model::ModelError>(())
+/// # Ok::<(), abbe_model::Diagnostic>(())
 /// ```
 ///
 /// # Errors
-/// [`ModelError::Session`] as for a session file, without its line.
+/// As for a session file, without its line.
 pub fn add_node(
     session: &mut Session,
     list: &str,
     entry: Node,
     columns: &[MemoryColumn<'_>],
-) -> Result<(), ModelError> {
+) -> Result<(), Diagnostic> {
     let source = Parsed::of_node(Node::table([(list.to_string(), Node::from_iter([entry]))]));
     let Additions { test, effect, socket_distance } = &source.document()?;
     let parts = Parts { test, effect, socket_distance, ..Parts::default() };

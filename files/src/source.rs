@@ -5,11 +5,12 @@ use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use abbe_model::diagnostic::FILE_ACCESS;
+use abbe_model::diagnostic::{Diagnostic, Location};
 use abbe_model::document::fault::{Fault, Finding, Step};
 use abbe_model::document::node::{Entry, Node, Value};
 use abbe_model::document::schema;
 use abbe_model::document::{LIST, from_node};
-use abbe_model::error::{Location, ModelError};
 use encoding_rs::{Encoding, UTF_8};
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
@@ -48,7 +49,7 @@ impl Source {
     ///
     /// # Errors
     /// If the file cannot be read or is not such a text, with its name and what to do.
-    pub fn read(store: &Store, file: &Path, what: &str) -> Result<Source, ModelError> {
+    pub fn read(store: &Store, file: &Path, what: &str) -> Result<Source, Diagnostic> {
         let (text, stamp) = text(store, file, what)?;
         Ok(Source { stamp: Some(stamp), ..Source::new(file, &text) })
     }
@@ -58,7 +59,7 @@ impl Source {
     ///
     /// # Errors
     /// If the file cannot be read, or is too large.
-    pub fn read_foreign(store: &Store, file: &Path, what: &str) -> Result<Source, ModelError> {
+    pub fn read_foreign(store: &Store, file: &Path, what: &str) -> Result<Source, Diagnostic> {
         let (bytes, stamp) = bytes(store, file, what)?;
         let (found, mark) = encoding::of_start(&bytes, None);
         let declared = declared(&bytes[mark..]);
@@ -67,11 +68,11 @@ impl Source {
             Ok((text, encoding)) if encoding != UTF_8 => stating_utf_8(&text),
             Ok((text, _)) => text.into_owned(),
             Err(encoding) => {
-                return Err(ModelError::Input {
-                    location: Location::file(file),
-                    message: format!("{what} is not valid {}", encoding::name_of(encoding)),
-                    help: Some("save the file as UTF-8".into()),
-                });
+                return Err(Diagnostic::input(
+                    Location::file(file),
+                    format!("{what} is not valid {}", encoding::name_of(encoding)),
+                    "save the file as UTF-8",
+                ));
             }
         };
         Ok(Source { stamp: Some(stamp), ..Source::new(file, &text) })
@@ -87,14 +88,16 @@ impl Source {
     ///
     /// # Errors
     /// If it is no TOML, with the line.
-    pub fn parse(&self) -> Result<Parsed<'_>, ModelError> {
-        let root = DeTable::parse(&self.text).map_err(|fault| ModelError::Input {
-            location: self.location(fault.span().unwrap_or(0..0)),
-            message: format!("not valid TOML: {}", fault.message()),
-            help: fault
-                .message()
-                .contains("recursion")
-                .then(|| format!("tables, lists and the parts of a key may be nested {MAX_DEPTH} levels deep")),
+    pub fn parse(&self) -> Result<Parsed<'_>, Diagnostic> {
+        let root = DeTable::parse(&self.text).map_err(|fault| {
+            Diagnostic::input(
+                self.location(fault.span().unwrap_or(0..0)),
+                format!("not valid TOML: {}", fault.message()),
+                fault
+                    .message()
+                    .contains("recursion")
+                    .then(|| format!("tables, lists and the parts of a key may be nested {MAX_DEPTH} levels deep")),
+            )
         })?;
         Ok(Parsed { source: Cow::Borrowed(self), is_json: false, root: node::of_toml(root.into_inner(), 0..0) })
     }
@@ -103,15 +106,13 @@ impl Source {
     ///
     /// # Errors
     /// If it is no JSON, with the line.
-    pub fn json(&self) -> Result<Parsed<'_>, ModelError> {
+    pub fn json(&self) -> Result<Parsed<'_>, Diagnostic> {
         // It limits the depth of nesting.
         let root = serde_json::from_str::<serde_json::Value>(&self.text)
             .and_then(|_| serde_json::from_str::<&RawValue>(&self.text))
             .and_then(|raw| node::of_json(raw, &self.text));
-        let root = root.map_err(|cause| ModelError::Input {
-            location: Location::line(&self.file, cause.line()),
-            message: format!("not valid JSON: {cause}"),
-            help: None,
+        let root = root.map_err(|cause| {
+            Diagnostic::input(Location::line(&self.file, cause.line()), format!("not valid JSON: {cause}"), None)
         })?;
         Ok(Parsed { source: Cow::Borrowed(self), is_json: true, root })
     }
@@ -146,7 +147,7 @@ impl Parsed<'_> {
     ///
     /// # Errors
     /// What is wrong, with its place.
-    pub fn document<T: DeserializeOwned + JsonSchema>(&self) -> Result<T, ModelError> {
+    pub fn document<T: DeserializeOwned + JsonSchema>(&self) -> Result<T, Diagnostic> {
         from_node(&self.root).map_err(|fault| {
             let path: Vec<Step> = fault.path.iter().rev().cloned().collect();
             self.error_of(fault.explained(|key| schema::meaning(&schema::of::<T>(""), &path, key)))
@@ -171,7 +172,7 @@ impl Parsed<'_> {
     }
 
     /// The error of a fault, with its place, what was found and what to do.
-    pub fn error_of(&self, fault: Fault) -> ModelError {
+    pub fn error_of(&self, fault: Fault) -> Diagnostic {
         let path: Vec<Step> = fault.path.into_iter().rev().collect();
         let (node, entry) = self.root.follow(path.iter());
         let quoted = || match entry {
@@ -184,10 +185,11 @@ impl Parsed<'_> {
         let (message, help) = match fault.finding {
             Finding::Other(error) => return *error,
             Finding::File { message, help } if self.source.text.is_empty() => {
-                return ModelError::Session { message, help };
+                return Diagnostic::session(message, help);
             }
             Finding::File { message, help } => {
-                return ModelError::FileAccess { location: self.source.location(span), message, help };
+                let found = Diagnostic::input(self.source.location(span), message, help);
+                return Diagnostic { code: FILE_ACCESS, ..found };
             }
             Finding::Said { message, help } if self.is_json && !path.is_empty() => {
                 (format!("{}: {message}", quoted()), help)
@@ -220,9 +222,9 @@ impl Parsed<'_> {
             }
         };
         if self.source.text.is_empty() && self.source.file.as_os_str().is_empty() {
-            return ModelError::Session { message, help: help.unwrap_or_default() };
+            return Diagnostic::session(message, help);
         }
-        ModelError::Input { location: self.source.location(span), message, help }
+        Diagnostic::input(self.source.location(span), message, help)
     }
 
     /// The name of a table in messages: `[instrument]`, `test "A100"`.
@@ -318,23 +320,21 @@ fn stating_utf_8(text: &str) -> String {
 
 /// Reads a text file: UTF-8 with or without byte order mark, of a limited size, unchanged while it is read. `what` names
 /// its content in messages.
-pub(crate) fn text(store: &Store, file: &Path, what: &str) -> Result<(String, FileStamp), ModelError> {
+pub(crate) fn text(store: &Store, file: &Path, what: &str) -> Result<(String, FileStamp), Diagnostic> {
     let (bytes, stamp) = bytes(store, file, what)?;
-    let text = String::from_utf8(bytes).map_err(|cause| ModelError::Input {
-        location: Location::file(file),
-        message: format!("byte {} is not UTF-8, the encoding of TOML", cause.utf8_error().valid_up_to() + 1),
-        help: Some("save the file as UTF-8".into()),
+    let text = String::from_utf8(bytes).map_err(|cause| {
+        Diagnostic::input(
+            Location::file(file),
+            format!("byte {} is not UTF-8, the encoding of TOML", cause.utf8_error().valid_up_to() + 1),
+            "save the file as UTF-8",
+        )
     })?;
     Ok((text, stamp))
 }
 
 /// The bytes of a file of a limited size, unchanged while it is read.
-fn bytes(store: &Store, file: &Path, what: &str) -> Result<(Vec<u8>, FileStamp), ModelError> {
-    let fault = |message: String, help: &str| ModelError::Input {
-        location: Location::file(file),
-        message,
-        help: Some(help.to_string()),
-    };
+fn bytes(store: &Store, file: &Path, what: &str) -> Result<(Vec<u8>, FileStamp), Diagnostic> {
+    let fault = |message: String, help: &str| Diagnostic::input(Location::file(file), message, help);
     if store.state(file).is_ok_and(|found| found.folder) {
         return Err(fault(format!("this is a folder; {what} must be a file"), "name the .toml file in it"));
     }

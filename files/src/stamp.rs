@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use abbe_model::error::{Location, ModelError};
+use abbe_model::diagnostic::{Diagnostic, Location};
 
 use super::store::{FileState, OpenFile, ReadBytes};
 
@@ -34,17 +34,17 @@ impl FileStamp {
     }
 
     /// Notes what was read. Returns an error if the open file has changed since it was opened.
-    pub(crate) fn finish(&self, opened: &OpenFile) -> Result<(), ModelError> {
+    pub(crate) fn finish(&self, opened: &OpenFile) -> Result<(), Diagnostic> {
         match opened.state() {
             Ok(found) if found == self.state || !self.state.regular => {
                 let _ = self.read.set(opened.read_bytes());
                 Ok(())
             }
-            _ => Err(ModelError::Input {
-                location: Location::file(&self.file),
-                message: "the file changed while it was read".into(),
-                help: Some("wait until it is written and try again".into()),
-            }),
+            _ => Err(Diagnostic::input(
+                Location::file(&self.file),
+                "the file changed while it was read",
+                "wait until it is written and try again",
+            )),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Component, Path};
 
-use abbe_model::error::ModelError;
+use abbe_model::Diagnostic;
 use abbe_model::session::Session;
 use abbe_model::session::readings::Readings;
 
@@ -29,7 +29,7 @@ pub fn with_readings(
     (session, sources): (&Session, &SourceMap),
     readings: &[Readings],
     changes: Changes,
-) -> Result<Vec<(String, Vec<u8>)>, ModelError> {
+) -> Result<Vec<(String, Vec<u8>)>, Diagnostic> {
     let mut files = Vec::new();
     let mut data: Vec<(String, String)> = Vec::new();
     for (test, readings) in session.tests.iter().zip(readings) {
@@ -43,10 +43,10 @@ pub fn with_readings(
     }
     for BodyFile { name, contents, .. } in &sources.bodies {
         if !Path::new(name).components().all(|part| matches!(part, Component::Normal(_))) {
-            return Err(ModelError::Session {
-                message: format!("the body in {name} cannot be copied with the session"),
-                help: "put the STL file beside the machine file, or below".into(),
-            });
+            return Err(Diagnostic::session(
+                format!("the body in {name} cannot be copied with the session"),
+                "put the STL file beside the machine file, or below",
+            ));
         }
         files.push((name.clone(), contents.to_vec()));
     }

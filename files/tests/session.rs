@@ -36,7 +36,7 @@ fn nominal(session: &Session, test: &Test, readings: &Readings) -> Vec<f64> {
 }
 
 /// A session with one test and the machine in the session file.
-fn one_test(test: &str) -> Result<Session, abbe_model::ModelError> {
+fn one_test(test: &str) -> Result<Session, abbe_model::Diagnostic> {
     let folder = tempfile::tempdir().unwrap();
     let text = format!(
         "[machine]\nchain = \"w C A b Y X Z t\"\n[machine.axis.C]\n[machine.axis.A]\ntravel_deg = [-120, 120]\n[machine.axis.X]\n\

@@ -10,6 +10,7 @@
 //! the ball. For a C axis with the ball at +X at C = 0, radial and tangential are Eqs. (10) and (11) of Yamaji,
 //! Hamabata & Ihara (2014): radial `X cos C + Y sin C`, tangential `−X sin C + Y cos C`.
 
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::frames::{Point, cross};
@@ -18,7 +19,7 @@ use abbe_model::instrument::rtest::{Orientation, RTest, SENSOR, Setting};
 use abbe_model::session::{placing, readings::Readings};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::error::IdentifyError;
+use crate::error;
 use crate::fit::Fit;
 use crate::problem::Problem;
 
@@ -49,14 +50,14 @@ pub struct DirectionComponents {
 ///
 /// # Errors
 /// If the session's instrument is no R-test.
-pub fn views(problem: &Problem, fit: &Fit) -> Result<Vec<Vec<DirectionComponents>>, IdentifyError> {
+pub fn views(problem: &Problem, fit: &Fit) -> Result<Vec<Vec<DirectionComponents>>, Diagnostic> {
     let machine = &problem.session.machine;
     let values = problem.slot_values(&fit.beta);
     let mut all = Vec::with_capacity(problem.tests.len());
     for (number, test) in problem.tests.iter().enumerate() {
         let (Some(rtest), Some(readings)) = (test.station.rtest(), &test.readings) else {
             let (found, expected) = (test.station.kind(), InstrumentKind::RTest);
-            return Err(IdentifyError::OtherInstrument { method: "directional components", found, expected });
+            return Err(error::other_instrument("directional components", found, expected));
         };
         let angles = std::array::from_fn(|i| values[number].constant[machine.error_slots() + SENSOR + i]);
         let orientation = Orientation::new(angles, machine.rotation);

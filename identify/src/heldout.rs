@@ -11,9 +11,9 @@ pub(crate) mod folds;
 mod joint_space;
 mod left_out_test;
 
+use abbe_model::Diagnostic;
 use faer::Mat;
 
-use crate::error::IdentifyError;
 use crate::numerics::parallel;
 use crate::numerics::solve::Svd;
 use crate::numerics::symmetric::Symmetric;
@@ -83,7 +83,7 @@ pub fn held_out(
     triangles: &[Triangle],
     whole: &Triangle,
     basis: &Mat<f64>,
-) -> Result<(Residuals, HeldOut), IdentifyError> {
+) -> Result<(Residuals, HeldOut), Diagnostic> {
     let all = WhitenedDirections::of(whole, basis)?;
     let steps = parallel::map(triangles.len(), &|fold| match all.step_without(&triangles[fold])? {
         Some(step) => Ok(step),
@@ -92,7 +92,7 @@ pub fn held_out(
             step_without(&problem.prior_triangle(beta).merged(others.map(|(_, triangle)| triangle)), beta, basis)
         }
     });
-    let steps: Vec<Vec<f64>> = steps.into_iter().collect::<Result<_, IdentifyError>>()?;
+    let steps: Vec<Vec<f64>> = steps.into_iter().collect::<Result<_, Diagnostic>>()?;
     let (residuals, held_out) = predicted(problem, beta, &steps)?;
     Ok((residuals, HeldOut { rms_mm: rms_mm(problem, &held_out), residuals: held_out }))
 }
@@ -102,7 +102,7 @@ type Residuals = Vec<Vec<f64>>;
 
 /// The residuals of every test, mm, outliers included: at `beta`, and each fold under the model linearised there, after the
 /// fold's step.
-fn predicted(problem: &Problem, beta: &[f64], steps: &[Vec<f64>]) -> Result<(Residuals, Residuals), IdentifyError> {
+fn predicted(problem: &Problem, beta: &[f64], steps: &[Vec<f64>]) -> Result<(Residuals, Residuals), Diagnostic> {
     let values = problem.slot_values(beta);
     let (mut residuals, mut held_out) =
         (vec![Vec::new(); problem.models.len()], vec![Vec::new(); problem.models.len()]);
@@ -125,7 +125,7 @@ fn predicted(problem: &Problem, beta: &[f64], steps: &[Vec<f64>]) -> Result<(Res
             }
             start += count;
         }
-        Ok::<_, IdentifyError>((present, residual))
+        Ok::<_, Diagnostic>((present, residual))
     });
     // Blocks are in the order of the rows.
     for (block, residual) in blocks.iter().zip(predicted) {
@@ -147,7 +147,7 @@ struct WhitenedDirections {
 }
 
 impl WhitenedDirections {
-    fn of(whole: &Triangle, basis: &Mat<f64>) -> Result<WhitenedDirections, IdentifyError> {
+    fn of(whole: &Triangle, basis: &Mat<f64>) -> Result<WhitenedDirections, Diagnostic> {
         let (r, c, _) = whole.parts();
         let directions = Svd::of((&r * basis).as_ref())?;
         let right = Mat::from_fn(c.len(), 1, |i, _| c[i]);
@@ -159,7 +159,7 @@ impl WhitenedDirections {
     }
 
     /// The step to the fit without a fold; `None` if the other folds barely determine a direction.
-    fn step_without(&self, fold: &Triangle) -> Result<Option<Vec<f64>>, IdentifyError> {
+    fn step_without(&self, fold: &Triangle) -> Result<Option<Vec<f64>>, Diagnostic> {
         if !self.complete {
             return Ok(None);
         }
@@ -189,7 +189,7 @@ impl WhitenedDirections {
 
 /// The step from the fit of all readings to that of the readings in `rest`. It is the minimum-norm solution: a
 /// direction that the remaining readings do not determine returns to its nominal value.
-fn step_without(rest: &Triangle, beta: &[f64], basis: &Mat<f64>) -> Result<Vec<f64>, IdentifyError> {
+fn step_without(rest: &Triangle, beta: &[f64], basis: &Mat<f64>) -> Result<Vec<f64>, Diagnostic> {
     let (r, c, _) = rest.parts();
     let n = beta.len();
     let absolute: Vec<f64> = (0..n).map(|i| c[i] + (i..n).map(|j| r[(i, j)] * beta[j]).sum::<f64>()).collect();

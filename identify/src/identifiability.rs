@@ -1,11 +1,11 @@
 //! Identifiability: null-space combinations, errors determined by set-up priors only, and near collinearity, each
 //! described in words.
 
+use abbe_model::Diagnostic;
 use faer::Mat;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::error::IdentifyError;
 use crate::linear::{Linearisation, is_of_interest};
 use crate::numerics::null_space::{combinations, echelon};
 use crate::numerics::rank::Rank;
@@ -161,7 +161,7 @@ fn in_display_units(problem: &Problem, row: &[f64], pivot: usize) -> Vec<(String
 ///
 /// # Errors
 /// If the decomposition fails.
-pub fn determined_by_prior(problem: &Problem, linear: &Linearisation) -> Result<Vec<DeterminedByPrior>, IdentifyError> {
+pub fn determined_by_prior(problem: &Problem, linear: &Linearisation) -> Result<Vec<DeterminedByPrior>, Diagnostic> {
     let list = &problem.parameters.list;
     let r = linear.readings.r();
     let alone = Rank::decide(&linear.readings, &linear.size, &linear.preference)?;
@@ -233,7 +233,7 @@ pub fn nearly_collinear(
     problem: &Problem,
     linear: &Linearisation,
     of_interest: &[usize],
-) -> Result<Vec<NearDependency>, IdentifyError> {
+) -> Result<Vec<NearDependency>, Diagnostic> {
     let list = &problem.parameters.list;
     let identifiable: Vec<usize> = of_interest.iter().copied().filter(|j| linear.rank.is_identifiable(*j)).collect();
     let r = linear.marginal(&identifiable)?;

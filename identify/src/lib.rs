@@ -70,5 +70,3 @@ pub mod statements;
 pub mod straightness;
 pub mod tolerance;
 pub mod unit;
-
-pub use error::IdentifyError;

@@ -4,10 +4,10 @@
 //! Factors are merged and reduced by orthogonal transformations, so that squaring loses no precision (Bierman,
 //! Factorization Methods for Discrete Sequential Estimation, 1977, ch. V).
 
+use abbe_model::Diagnostic;
 use abbe_model::session::Prior;
 use faer::Mat;
 
-use crate::error::IdentifyError;
 use crate::numerics::rank::Rank;
 use crate::numerics::triangle::Triangle;
 use crate::parameters::{Parameter, Role, pivot_preference};
@@ -38,7 +38,7 @@ impl Linearisation {
     ///
     /// # Errors
     /// If the model cannot be evaluated.
-    pub fn of(problem: &Problem, beta: &[f64]) -> Result<Linearisation, IdentifyError> {
+    pub fn of(problem: &Problem, beta: &[f64]) -> Result<Linearisation, Diagnostic> {
         let tests = problem.triangles(beta)?;
         let prior = problem.prior_triangle(beta);
         let size = problem.parameters.sizes();
@@ -59,7 +59,7 @@ impl Linearisation {
     ///
     /// # Errors
     /// If the decomposition fails.
-    pub fn without(&self, left_out: &[usize]) -> Result<(Rank, Mat<f64>), IdentifyError> {
+    pub fn without(&self, left_out: &[usize]) -> Result<(Rank, Mat<f64>), Diagnostic> {
         let kept = self.tests.iter().enumerate().filter(|(test, _)| !left_out.contains(test)).map(|(_, t)| t);
         self.with(&self.prior.clone().merged(kept))
     }
@@ -68,7 +68,7 @@ impl Linearisation {
     ///
     /// # Errors
     /// If the decomposition fails.
-    pub fn with(&self, whole: &Triangle) -> Result<(Rank, Mat<f64>), IdentifyError> {
+    pub fn with(&self, whole: &Triangle) -> Result<(Rank, Mat<f64>), Diagnostic> {
         let rank = Rank::decide(whole, &self.size, &self.preference)?;
         let covariance = whole.covariance(&rank.identifiable_basis)?;
         Ok((rank, covariance))
@@ -79,7 +79,7 @@ impl Linearisation {
     ///
     /// # Errors
     /// If the decomposition fails.
-    pub fn marginal(&self, kept: &[usize]) -> Result<Mat<f64>, IdentifyError> {
+    pub fn marginal(&self, kept: &[usize]) -> Result<Mat<f64>, Diagnostic> {
         self.whole.marginal(kept, &self.size)
     }
 }

@@ -6,6 +6,7 @@ mod preference;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use abbe_model::Diagnostic;
 use abbe_model::driver::Reference;
 use abbe_model::effect::{CoefficientPrior, Component, Effect};
 use abbe_model::instrument::InstrumentKind;
@@ -13,7 +14,7 @@ use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::{Prior, Session, Test};
 use abbe_model::unit::InternalUnit;
 
-use crate::error::IdentifyError;
+use crate::error;
 use crate::start::{point_mm, points};
 use crate::unit::ParameterUnit;
 use basis::BasisOverTest;
@@ -151,12 +152,12 @@ impl Parameters {
     ///
     /// # Errors
     /// If an error belongs to no axis of the machine or is declared twice.
-    pub fn declared(session: &Session, tests: &[Test], models: &[TestModel]) -> Result<Parameters, IdentifyError> {
+    pub fn declared(session: &Session, tests: &[Test], models: &[TestModel]) -> Result<Parameters, Diagnostic> {
         let mut parameters = Parameters { contributions: vec![Vec::new(); tests.len()], ..Parameters::default() };
         for name in &session.unknowns {
             let id = name.to_string();
             let Some(slot) = session.machine.error_slot(name) else {
-                return Err(IdentifyError::no_axis(&session.machine, &format!("`{id}`: "), &name.axis));
+                return Err(error::no_axis(&session.machine, &format!("`{id}`: "), &name.axis));
             };
             let unit = name.freedom.unit();
             let index = parameters.push(Parameter {
@@ -206,9 +207,9 @@ impl Parameters {
         Ok(parameters)
     }
 
-    fn push(&mut self, parameter: Parameter) -> Result<usize, IdentifyError> {
+    fn push(&mut self, parameter: Parameter) -> Result<usize, Diagnostic> {
         if self.list.iter().any(|present| present.id == parameter.id) {
-            return Err(IdentifyError::RepeatedUnknown { id: parameter.id });
+            return Err(error::repeated_unknown(parameter.id));
         }
         self.list.push(parameter);
         Ok(self.list.len() - 1)
@@ -225,16 +226,17 @@ impl Parameters {
         models: &[TestModel],
         reference: &Reference,
         effect: &Effect,
-    ) -> Result<(), IdentifyError> {
+    ) -> Result<(), Diagnostic> {
         let size = match effect.component.unit(&session.instrument_parameters()) {
             Some(unit) => physical_size(unit),
             None if effect.component == Component::TriggerDelay => LONG_DELAY_S,
             None => {
-                return Err(IdentifyError::NoSuchComponent {
-                    effect: effect.id(),
-                    component: effect.component.to_string(),
-                    instrument: session.instrument.word(),
-                });
+                return Err(Diagnostic::identification(format!(
+                    "effect `{}`: a {} session has no component `{}`",
+                    effect.id(),
+                    session.instrument.word(),
+                    effect.component
+                )));
             }
         };
         let prior = match effect.prior {
@@ -246,7 +248,7 @@ impl Parameters {
         let number = self.effects.len();
         let first = self.list.len();
         if self.effects.contains(effect) {
-            return Err(IdentifyError::RepeatedUnknown { id: effect.id() });
+            return Err(error::repeated_unknown(effect.id()));
         }
         let earlier = self.effects.iter().filter(|other| other.id() == effect.id()).count();
         let id = match earlier {
@@ -345,7 +347,7 @@ impl Parameters {
         models: &[TestModel],
         reference: &Reference,
         effect: &Effect,
-    ) -> Result<Vec<f64>, IdentifyError> {
+    ) -> Result<Vec<f64>, Diagnostic> {
         let mut levels = Vec::new();
         for (test, model) in tests.iter().zip(models) {
             levels
@@ -381,7 +383,7 @@ impl Parameters {
         models: &[TestModel],
         reference: &Reference,
         beta: &mut [f64],
-    ) -> Result<(), IdentifyError> {
+    ) -> Result<(), Diagnostic> {
         for index in 0..self.effects.len() {
             if self.effects[index].estimated.is_empty() && !self.effects[index].positions_estimated {
                 continue;

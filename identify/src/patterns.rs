@@ -6,12 +6,13 @@
 //! Jiang (2014): X. Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis,
 //! University of Birmingham.
 
+use abbe_model::Diagnostic;
 use abbe_model::session::Session;
 use abbe_model::session::readings::Readings;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::error::IdentifyError;
+use crate::error;
 use crate::quantity::Given;
 use crate::simulate::{Simulation, simulate};
 
@@ -66,16 +67,16 @@ pub fn usual_sizes(session: &Session) -> Vec<Given> {
 /// # Errors
 /// If a movement is impossible, a name or unit does not fit the session, or the model yields a number that is not
 /// finite.
-pub fn patterns(session: &Session, errors: &[Given]) -> Result<Patterns, IdentifyError> {
+pub fn patterns(session: &Session, errors: &[Given]) -> Result<Patterns, Diagnostic> {
     if errors.is_empty() {
-        return Err(IdentifyError::not_applicable(
+        return Err(error::not_applicable(
             "no error to show",
             "`[unknowns] errors` is empty",
             "give at least one error with its size, as in EY0A=10um",
         ));
     }
     if session.units().angles {
-        return Err(IdentifyError::not_applicable(
+        return Err(error::not_applicable(
             "patterns show lengths",
             "a test of this session reads angles",
             "`plan` and the sensitivities of a report show both",
@@ -85,7 +86,7 @@ pub fn patterns(session: &Session, errors: &[Given]) -> Result<Patterns, Identif
     exact.resolution_mm = None;
     let drawn = |given: Vec<Given>| {
         let simulation = Simulation { given, noise_mm: Some(0.0), ..Simulation::default() };
-        Ok::<_, IdentifyError>(simulate(&exact, &simulation)?.readings)
+        Ok::<_, Diagnostic>(simulate(&exact, &simulation)?.readings)
     };
     let without = drawn(Vec::new())?;
     let mut by_error = Vec::with_capacity(errors.len());

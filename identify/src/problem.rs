@@ -13,6 +13,7 @@ pub use whitening::Filter;
 use std::ops::Range;
 use std::sync::Arc;
 
+use abbe_model::Diagnostic;
 use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::effect::Effect;
 use abbe_model::instrument::channel::{self, Channel};
@@ -25,7 +26,7 @@ use faer::Mat;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use crate::error::IdentifyError;
+use crate::error;
 use crate::heldout::folds::Folds;
 use crate::noise::Noise;
 use crate::numerics::parallel;
@@ -99,10 +100,10 @@ impl Problem {
     ///
     /// # Errors
     /// If there are no readings, or an effect cannot be evaluated.
-    pub fn new(session: &Session, noise: Noise, seed: u64) -> Result<Problem, IdentifyError> {
+    pub fn new(session: &Session, noise: Noise, seed: u64) -> Result<Problem, Diagnostic> {
         let tests: Vec<Test> = session.tests.iter().filter(|test| test.readings.is_some()).cloned().collect();
         if tests.is_empty() {
-            return Err(IdentifyError::NoReadings);
+            return Err(error::no_readings());
         }
         let (tests, stations) = crate::start::located(session, tests, &noise);
         Problem::at(session, tests, stations, noise, seed)
@@ -118,7 +119,7 @@ impl Problem {
         stations: Vec<Station<f64>>,
         noise: Noise,
         seed: u64,
-    ) -> Result<Problem, IdentifyError> {
+    ) -> Result<Problem, Diagnostic> {
         let mut models: Vec<TestModel> = Vec::with_capacity(tests.len());
         for (test, station) in tests.iter_mut().zip(stations) {
             if let Some(readings) = &mut test.readings {
@@ -197,7 +198,7 @@ impl Problem {
     ///
     /// # Errors
     /// See [`Parameters::add_effect`].
-    pub fn add_effect(&mut self, effect: &Effect) -> Result<(), IdentifyError> {
+    pub fn add_effect(&mut self, effect: &Effect) -> Result<(), Diagnostic> {
         self.parameters.add_effect(&self.session, &self.tests, &self.models, &self.reference, effect)?;
         self.update_test_parameters();
         Ok(())
@@ -208,7 +209,7 @@ impl Problem {
     ///
     /// # Errors
     /// If the data lack the column of a driver.
-    pub fn linearise_numbers(&mut self, beta: &mut [f64]) -> Result<(), IdentifyError> {
+    pub fn linearise_numbers(&mut self, beta: &mut [f64]) -> Result<(), Diagnostic> {
         if self.parameters.has_numbers() || self.parameters.positions().next().is_some() {
             let (tests, models) = (&self.tests, &self.models);
             self.parameters.linearise_numbers(&self.session, tests, models, &self.reference, beta)?;
@@ -221,7 +222,7 @@ impl Problem {
     ///
     /// # Errors
     /// If the data lack the column of the driver.
-    pub(crate) fn levels(&self, effect: &Effect) -> Result<Vec<f64>, IdentifyError> {
+    pub(crate) fn levels(&self, effect: &Effect) -> Result<Vec<f64>, Diagnostic> {
         Parameters::levels(&self.session, &self.tests, &self.models, &self.reference, effect)
     }
 
@@ -355,7 +356,7 @@ impl Problem {
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
-    pub fn rows(&self, values: &[SlotValues], block: &RowBlock) -> Result<Mat<f64>, IdentifyError> {
+    pub fn rows(&self, values: &[SlotValues], block: &RowBlock) -> Result<Mat<f64>, Diagnostic> {
         let own = &self.test_parameters[block.test].parameters;
         let own_rows = self.own_rows(&values[block.test], block)?;
         let mut rows = Mat::zeros(own_rows.nrows(), self.parameters.list.len() + 1);
@@ -376,7 +377,7 @@ impl Problem {
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
-    pub fn own_rows(&self, values: &SlotValues, block: &RowBlock) -> Result<Mat<f64>, IdentifyError> {
+    pub fn own_rows(&self, values: &SlotValues, block: &RowBlock) -> Result<Mat<f64>, Diagnostic> {
         let channels = self.channels(block.test);
         let own = &self.test_parameters[block.test];
         let scalars = block.rows.start * channels..block.rows.end * channels;
@@ -427,11 +428,9 @@ impl Problem {
         }
         match bad {
             None => Ok(rows),
-            Some((row, value)) => Err(IdentifyError::NotFinite {
-                test: self.tests[block.test].name.clone(),
-                row: block.rows.start + row + 1,
-                value,
-            }),
+            Some((row, value)) => {
+                Err(error::not_finite(&self.tests[block.test].name, block.rows.start + row + 1, value))
+            }
         }
     }
 

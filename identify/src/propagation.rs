@@ -13,9 +13,10 @@ mod refit;
 
 use statrs::distribution::{Continuous, Normal};
 
+use abbe_model::Diagnostic;
 use abbe_model::words::counted;
 
-use crate::error::IdentifyError;
+use crate::error;
 use crate::fit;
 use crate::fit::Fit;
 use crate::monte_carlo::{self, Distribution, Draws, MonteCarlo};
@@ -35,9 +36,9 @@ pub fn add_monte_carlo(
     fit: &Fit,
     draws: &MonteCarlo,
     result: &mut FitResult,
-) -> Result<(), IdentifyError> {
+) -> Result<(), Diagnostic> {
     if fit.rank.identifiable_basis.ncols() == 0 {
-        return Err(IdentifyError::NothingIdentifiable { lacking: "nothing to propagate" });
+        return Err(error::nothing_identifiable("nothing to propagate"));
     }
     let refit = Refit::new(problem, fit)?;
     let mean = vec![0.0; refit.u.len()];
@@ -47,7 +48,7 @@ pub fn add_monte_carlo(
     );
     let unconverged = distributions.iter().map(|d| d.outside[2]).max().unwrap_or(0);
     if unconverged * 2 > draws.runs {
-        return Err(IdentifyError::not_applicable(
+        return Err(error::not_applicable(
             "Monte Carlo",
             format!("{unconverged} of {} cannot be fitted", counted(draws.runs, "draw")),
             "the model cannot be evaluated over the range of the set-up uncertainties: state smaller ones, or fit without \

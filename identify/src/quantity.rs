@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use abbe_files::read::lowered;
+use abbe_model::Diagnostic;
 use abbe_model::document::fault::Fault;
 use abbe_model::document::node::{Named, Node};
 use abbe_model::document::value::Long;
@@ -12,7 +13,6 @@ use abbe_model::words::number as number_in_words;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::error::IdentifyError;
 use crate::unit::ParameterUnit;
 
 /// The value of one parameter, with its unit.
@@ -22,7 +22,7 @@ use crate::unit::ParameterUnit;
 ///
 /// let given = Given::parse("EB0A = -1.3arcsec")?;
 /// assert_eq!((given.id.as_str(), given.value, given.unit.as_str()), ("EB0A", -1.3, "arcsec"));
-/// # Ok::<(), abbe_identify::IdentifyError>(())
+/// # Ok::<(), abbe_model::Diagnostic>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[schemars(rename = "TrueValue", description = "The true value of a parameter.")]
@@ -43,9 +43,9 @@ impl Given {
     ///
     /// # Errors
     /// If there is no `=`, no finite number or no unit.
-    pub fn parse(text: &str) -> Result<Given, IdentifyError> {
+    pub fn parse(text: &str) -> Result<Given, Diagnostic> {
         let Some((id, quantity)) = text.rsplit_once('=') else {
-            return Err(IdentifyError::NotAQuantity { text: text.to_string(), fault: "has no value" });
+            return Err(not_a_quantity(text, "has no value"));
         };
         Given::of(id.trim(), quantity)
     }
@@ -54,11 +54,11 @@ impl Given {
     ///
     /// # Errors
     /// If the text does not start with a finite number of moderate size, or has no unit.
-    pub fn of(id: &str, quantity: &str) -> Result<Given, IdentifyError> {
+    pub fn of(id: &str, quantity: &str) -> Result<Given, Diagnostic> {
         let quantity = quantity.trim();
         if quantity.len() > MAX_BYTES {
             let found = format!("a number with its unit of {} bytes", quantity.len());
-            return Err(IdentifyError::TooLarge { name: id.to_string(), found, limit: format!("{MAX_BYTES} bytes") });
+            return Err(too_large(id, &found, &format!("{MAX_BYTES} bytes")));
         }
         // The longest prefix that is a number: `1e3um` is a thousand µm, and an `e` that starts a unit is no exponent.
         let number = (1..=quantity.len()).rev().filter(|end| quantity.is_char_boundary(*end)).find_map(|end| {
@@ -66,21 +66,18 @@ impl Given {
             Some((value, quantity[end..].trim()))
         });
         let text = format!("{id}={quantity}");
-        let too_large = |name: String, found: String, limit: &str| {
-            Err(IdentifyError::TooLarge { name, found, limit: limit.to_string() })
-        };
         match number {
             Some((value, _)) if value.is_finite() && value.abs() > LARGEST => {
-                too_large(text, number_in_words(value), &format!("{LARGEST:e}"))
+                Err(too_large(&text, &number_in_words(value), &format!("{LARGEST:e}")))
             }
             Some((value, unit)) if longer_than_a_kilometre(value, unit) => {
-                too_large(text, format!("{} {unit}", number_in_words(value)), "1 km")
+                Err(too_large(&text, &format!("{} {unit}", number_in_words(value)), "1 km"))
             }
             Some((value, unit)) if value.is_finite() && (!unit.is_empty() || value == 0.0) => {
                 Ok(Given { id: id.to_string(), value, unit: unit.to_string() })
             }
-            Some((value, "")) if value.is_finite() => Err(IdentifyError::NotAQuantity { text, fault: "has no unit" }),
-            _ => Err(IdentifyError::NotAQuantity { text, fault: "is not a number with a unit" }),
+            Some((value, "")) if value.is_finite() => Err(not_a_quantity(&text, "has no unit")),
+            _ => Err(not_a_quantity(&text, "is not a number with a unit")),
         }
     }
 
@@ -88,7 +85,7 @@ impl Given {
     ///
     /// # Errors
     /// If the two units are of different quantities.
-    pub fn inside(&self, unit: &ParameterUnit) -> Result<f64, IdentifyError> {
+    pub fn inside(&self, unit: &ParameterUnit) -> Result<f64, Diagnostic> {
         self.in_unit(&unit.name).map(|value| value / unit.display_per_internal)
     }
 
@@ -96,7 +93,7 @@ impl Given {
     ///
     /// # Errors
     /// If the two units are of different quantities.
-    pub fn in_unit(&self, wanted: &str) -> Result<f64, IdentifyError> {
+    pub fn in_unit(&self, wanted: &str) -> Result<f64, Diagnostic> {
         if self.value == 0.0 || self.unit == wanted {
             return Ok(self.value);
         }
@@ -107,12 +104,22 @@ impl Given {
             let (wanted_above, wanted_below) = wanted.split_once('/')?;
             (below == wanted_below).then(|| convert(above, wanted_above))?
         });
-        converted.ok_or_else(|| IdentifyError::OtherUnit {
-            name: self.id.clone(),
-            unit: self.unit.clone(),
-            expected: wanted.to_string(),
+        converted.ok_or_else(|| {
+            Diagnostic::identification(format!(
+                "`{}` has the unit `{}`; a unit such as `{wanted}` is expected",
+                self.id, self.unit
+            ))
         })
     }
+}
+
+fn not_a_quantity(text: &str, fault: &str) -> Diagnostic {
+    let form = "write name, number and unit as in `EY0A=35.3um`";
+    Diagnostic::identification(format!("`{text}` {fault}; {form}"))
+}
+
+fn too_large(name: &str, found: &str, limit: &str) -> Diagnostic {
+    Diagnostic::identification(format!("`{name}`: {found} is too large; the limit is {limit}"))
 }
 
 /// Whether a value is a length beyond [`MAX_LENGTH_MM`].
@@ -126,7 +133,7 @@ fn longer_than_a_kilometre(value: f64, unit: &str) -> bool {
 /// # Errors
 /// If the file cannot be read, is not TOML, or a value is not text with a number and a unit. The message names the file
 /// and the entry.
-pub fn read(path: &Path) -> Result<Vec<Given>, IdentifyError> {
+pub fn read(path: &Path) -> Result<Vec<Given>, Diagnostic> {
     let given = |(key, value): &(String, Node)| match value.as_text() {
         Some(quantity) => Given::of(key, quantity).map_err(|error| Fault::new(error.to_string(), None).at(key)),
         None => {

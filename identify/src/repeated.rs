@@ -12,10 +12,11 @@
 
 use std::collections::BTreeSet;
 
+use abbe_model::Diagnostic;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::error::IdentifyError;
+use crate::error;
 use crate::fit::{Fit, parameters};
 use crate::numerics::tails::{chi_square_tails, normal_tail};
 use crate::parameters::Role;
@@ -127,7 +128,7 @@ pub struct DeviatingSession {
 ///
 /// # Errors
 /// If there are fewer than two sessions, or their plans differ.
-pub fn compare(sessions: &[Session]) -> Result<Repeated, IdentifyError> {
+pub fn compare(sessions: &[Session]) -> Result<Repeated, Diagnostic> {
     let [first, others @ ..] = sessions else {
         return Err(one_session());
     };
@@ -172,17 +173,19 @@ pub fn compare(sessions: &[Session]) -> Result<Repeated, IdentifyError> {
     Ok(result)
 }
 
-fn one_session() -> IdentifyError {
-    IdentifyError::TooFew { purpose: "the scatter of a parameter", what: "sessions", least: 2, found: 1 }
+fn one_session() -> Diagnostic {
+    error::too_few("the scatter of a parameter", "sessions", 2, 1)
 }
 
 /// Checks that two sessions are repeats of one plan.
-fn same_plan(first: &Session, other: &Session) -> Result<(), IdentifyError> {
-    let fault = |what: String| IdentifyError::Unlike {
-        one: other.name.clone(),
-        relation: "a repeat of",
-        other: first.name.clone(),
-        difference: format!("{what}; repeated sessions have the same machine, tests and parameters"),
+fn same_plan(first: &Session, other: &Session) -> Result<(), Diagnostic> {
+    let fault = |what: String| {
+        error::unlike(
+            &other.name,
+            "a repeat of",
+            &first.name,
+            format!("{what}; repeated sessions have the same machine, tests and parameters"),
+        )
     };
     if first.plan != other.plan {
         return Err(fault(format!("it is {}, not {}", other.plan, first.plan)));

@@ -8,6 +8,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use abbe_model::Diagnostic;
 use abbe_model::component::ErrorName;
 use abbe_model::sensitivity::TestModel;
 use abbe_model::session::readings::Readings;
@@ -18,7 +19,7 @@ use rand_pcg::Pcg64;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::error::IdentifyError;
+use crate::error;
 use crate::parameters::{Parameters, Role};
 use crate::quantity::Given;
 
@@ -118,10 +119,10 @@ const SETUP_STREAM: u128 = 0;
 /// # Errors
 /// If the plan cannot be carried out, a name or a unit does not fit the session, or the model yields a number that is
 /// not finite.
-pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated, IdentifyError> {
+pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated, Diagnostic> {
     if session.instruments().iter().any(|kind| !kind.entry().has_readings) {
         let found = "a socket session has no readings to draw";
-        return Err(IdentifyError::not_applicable("simulation", found, "its poses are its data"));
+        return Err(error::not_applicable("simulation", found, "its poses are its data"));
     }
     let planned = planned::planned_session(session)?;
     let mut given = Vec::with_capacity(simulation.given.len());
@@ -129,7 +130,7 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
     for value in &simulation.given {
         let id = result_id(&open, &value.id)?;
         if given.iter().any(|(known, _): &(String, &Given)| *known == id) {
-            return Err(IdentifyError::RepeatedUnknown { id: value.id.clone() });
+            return Err(error::repeated_unknown(&value.id));
         }
         if let Some(name) = ErrorName::parse(&id)
             && !open.unknowns.contains(&name)
@@ -177,11 +178,7 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
     for (index, (model, values)) in models.iter().zip(&values).enumerate() {
         let mut observed = model.readings(values);
         if let Some(bad) = observed.iter().position(|value| !value.is_finite()) {
-            return Err(IdentifyError::NotFinite {
-                test: tests[index].name.clone(),
-                row: bad / model.channels().len() + 1,
-                value: observed[bad],
-            });
+            return Err(error::not_finite(&tests[index].name, bad / model.channels().len() + 1, observed[bad]));
         }
         let mut random = Pcg64::new(u128::from(simulation.seed), index as u128 + 1);
         for values in observed.chunks_exact_mut(model.channels().len()) {
@@ -243,7 +240,7 @@ fn with_free_setups(session: &Session, planned: Vec<Readings>) -> Session {
 }
 
 /// The identifier in results: errors of axes by ISO 230-1.
-fn result_id(session: &Session, id: &str) -> Result<String, IdentifyError> {
+fn result_id(session: &Session, id: &str) -> Result<String, Diagnostic> {
     let Some(mut name) = ErrorName::parse(id) else {
         return Ok(id.to_string());
     };
@@ -253,7 +250,7 @@ fn result_id(session: &Session, id: &str) -> Result<String, IdentifyError> {
         .axis_index(&name.axis)
         .or_else(|| machine.axes.iter().position(|axis| axis.name.to_lowercase() == lower));
     let Some(axis) = axis else {
-        return Err(IdentifyError::no_axis(machine, &format!("`{id}`: "), &name.axis));
+        return Err(error::no_axis(machine, &format!("`{id}`: "), &name.axis));
     };
     name.axis.clone_from(&machine.axes[axis].name);
     Ok(name.to_string())
@@ -261,7 +258,7 @@ fn result_id(session: &Session, id: &str) -> Result<String, IdentifyError> {
 
 /// Writes the given values to the parameters. Amplitude and phase of a harmonic become cosine and sine,
 /// `A·cos(nq + φ) = A cos φ · cos nq − A sin φ · sin nq`.
-fn assign(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64]) -> Result<(), IdentifyError> {
+fn assign(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64]) -> Result<(), Diagnostic> {
     let find = |id: &str| parameters.list.iter().position(|parameter| parameter.id == id);
     let mut used = vec![false; given.len()];
     for effect in &parameters.effects {
@@ -273,20 +270,20 @@ fn assign(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64])
         let (amplitude, phase) = (part("amplitude"), part("phase"));
         let Some(amplitude) = amplitude else {
             if phase.is_some() {
-                return Err(IdentifyError::Missing {
-                    of: format!("`{id}`"),
-                    what: "amplitude beside its phase".to_string(),
-                    remedy: format!("give `{id}.amplitude`"),
-                });
+                return Err(error::missing(
+                    format!("`{id}`"),
+                    "amplitude beside its phase",
+                    format!("give `{id}.amplitude`"),
+                ));
             }
             continue;
         };
         if part("cos").is_some() || part("sin").is_some() {
-            return Err(IdentifyError::Contradictory {
-                one: format!("`{id}.amplitude`"),
-                other: format!("`{id}.cos` or `{id}.sin`"),
-                remedy: "give one or the other",
-            });
+            return Err(error::contradictory(
+                format!("`{id}.amplitude`"),
+                format!("`{id}.cos` or `{id}.sin`"),
+                "give one or the other",
+            ));
         }
         let Some(cosine) = find(&format!("{id}.cos")) else {
             continue;
@@ -316,7 +313,7 @@ fn assign(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64])
 }
 
 /// The error for an identifier that the session lacks, with those that it has.
-fn unknown_identifier(parameters: &Parameters, id: &str) -> IdentifyError {
+fn unknown_identifier(parameters: &Parameters, id: &str) -> Diagnostic {
     let of_role = |coefficients: bool| {
         let chosen = parameters.list.iter().filter(|parameter| match parameter.role {
             Role::Coefficient { .. } => coefficients,
@@ -330,7 +327,7 @@ fn unknown_identifier(parameters: &Parameters, id: &str) -> IdentifyError {
         true => "coefficients of its effects are",
         false => "errors are named as in EY0A; set-up quantities are",
     };
-    IdentifyError::unknown("the session", "parameter", id, these, of_role(of_effect))
+    error::unknown("the session", "parameter", id, these, of_role(of_effect))
 }
 
 /// Warnings about values without an effect on the readings, and declared effects without a value.

@@ -11,13 +11,15 @@
 //! with `E0 = Trans(EX0k, EY0k, EZ0k) · Rx(EA0k) · Ry(EB0k) · Rz(EC0k)` the location errors, `E(q)` the error motions
 //! in the same order, and ω0 the squareness errors `(EA0k, EB0k, EC0k)` of a linear axis.
 
+use crate::Diagnostic;
 use crate::axis::{Axis, AxisKind};
 use crate::body::Body;
 use crate::code::StructuralCode;
 use crate::component::{ErrorKind, ErrorName};
-use crate::error::ModelError;
+use crate::diagnostic::{Area, Code};
 use crate::frames::{Point, Rotation, SinCos, SmallMotion, cross_nominal};
 use crate::scalar::{Nominal, Scalar};
+use crate::words::{MAX_QUOTED, cut};
 
 /// Number of error slots per axis: six location errors, then six error motions.
 pub const ERRORS_PER_AXIS: usize = 12;
@@ -102,12 +104,23 @@ impl<S: Scalar> BodyErrors<S> {
     }
 }
 
+/// The kind of an axis does not follow from its name.
+pub const UNKNOWN_AXIS_KIND: Code = Code { area: Area::Session, word: "unknown-axis-kind" };
+
+/// [`UNKNOWN_AXIS_KIND`] in words.
+pub fn unknown_axis_kind(axis: &str) -> Diagnostic {
+    let axis = cut(axis, MAX_QUOTED);
+    let message =
+        format!("axis `{axis}` is not an ISO 841 letter; state its `kind` (\"rotary\" or \"linear\") and `direction`");
+    Diagnostic::coded(UNKNOWN_AXIS_KIND, message)
+}
+
 impl Machine {
     /// A machine from a structural code of ISO 841 letters: directions of R, origins at R's origin, no travel stated.
     ///
     /// # Errors
     /// If the code is invalid or an axis is not an ISO 841 letter.
-    pub fn from_code(text: &str) -> Result<Machine, ModelError> {
+    pub fn from_code(text: &str) -> Result<Machine, Diagnostic> {
         let code = StructuralCode::parse(text)?;
         let axes = code
             .axes()
@@ -115,7 +128,7 @@ impl Machine {
                 let kind = AxisKind::of_letter(name);
                 let direction = Axis::direction_of_letter(name);
                 let (Some(kind), Some(direction)) = (kind, direction) else {
-                    return Err(ModelError::UnknownAxisKind { axis: name.clone() });
+                    return Err(unknown_axis_kind(name));
                 };
                 Ok(Axis { name: name.clone(), kind, direction, origin_mm: [0.0; 3], travel: None, joint: None })
             })

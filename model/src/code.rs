@@ -2,7 +2,8 @@
 //!
 //! `w C A b Y X Z t` (spaced, any axis names) and `[wCAbYXZt]` (compact, one letter per axis) are equivalent.
 
-use crate::error::ModelError;
+use crate::Diagnostic;
+use crate::words::{MAX_QUOTED, cut, shortened};
 
 /// Largest number of axes in a chain.
 pub const MAX_AXES: usize = 64;
@@ -16,7 +17,7 @@ pub const MAX_AXES: usize = 64;
 /// assert_eq!((code.workpiece_side.len(), code.tool_side.len()), (2, 3));
 /// assert_eq!(code.spaced(), "w C A b Y X Z t");
 /// assert!(StructuralCode::parse("wCAYXZt").unwrap_err().to_string().contains("0 beds"));
-/// # Ok::<(), abbe_model::ModelError>(())
+/// # Ok::<(), abbe_model::Diagnostic>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StructuralCode {
@@ -26,13 +27,20 @@ pub struct StructuralCode {
     pub tool_side: Vec<String>,
 }
 
+/// What is wrong with a structural code.
+pub fn structural_code(code: &str, found: &str) -> Diagnostic {
+    let (code, found) = (cut(code, MAX_QUOTED), shortened(found));
+    let form = "a code goes from workpiece over bed to tool, as in `w C A b Y X Z t`";
+    Diagnostic::session(format!("structural code `{code}`: {found}; {form}"), None)
+}
+
 impl StructuralCode {
     /// Parses either form.
     ///
     /// # Errors
     /// The message names what is missing: `w` at the start, `t` at the end, exactly one `b`, each axis once.
-    pub fn parse(text: &str) -> Result<StructuralCode, ModelError> {
-        let fault = |found: String| ModelError::StructuralCode { code: text.to_string(), found };
+    pub fn parse(text: &str) -> Result<StructuralCode, Diagnostic> {
+        let fault = |found: String| structural_code(text, &found);
         let inner = text.trim().trim_start_matches('[').trim_end_matches(']').trim();
         let bodies: Vec<String> = if inner.contains(char::is_whitespace) {
             inner.split_whitespace().map(str::to_string).collect()

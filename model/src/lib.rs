@@ -42,7 +42,7 @@
 //! assert!((reading(&machine, &bar, c, 0.0_f64) - 125.0).abs() < 1e-12);
 //! let with = reading(&machine, &bar, c, Dual64::from(0.0).derivative());
 //! assert!((with.eps + 100.0 * c.sin() / 125.0).abs() < 1e-12);
-//! # Ok::<(), abbe_model::ModelError>(())
+//! # Ok::<(), abbe_model::Diagnostic>(())
 //! ```
 
 #![cfg_attr(
@@ -56,10 +56,10 @@ pub mod calendar;
 pub mod chain;
 pub mod code;
 pub mod component;
+pub mod diagnostic;
 pub mod document;
 pub mod driver;
 pub mod effect;
-pub mod error;
 pub mod expression;
 pub mod frames;
 pub mod instrument;
@@ -74,4 +74,4 @@ pub mod session;
 pub mod unit;
 pub mod words;
 
-pub use error::ModelError;
+pub use diagnostic::Diagnostic;

@@ -1,11 +1,11 @@
 //! The analysis of a plan: predicted uncertainties, identifiability and efficiency before the measurement.
 
+use abbe_model::Diagnostic;
 use abbe_model::sensitivity::SlotValues;
 use abbe_model::session::Session;
 
 use super::results::{Correlation, ErrorAnalysis, LeaveOneOut, PlanAnalysis, TestSummary, VarianceInflation};
 use super::{budget, collision, effects, indices, sensitivity, states};
-use crate::PlanError;
 use abbe_identify::identifiability;
 use abbe_identify::linear::{Linearisation, is_of_interest};
 use abbe_identify::noise::{Noise, NoiseSource, ReadingNoise};
@@ -41,7 +41,7 @@ const MIN_REPORTED_RATIO: f64 = 1.5;
 ///
 /// # Errors
 /// If a test has neither data nor a movement, if a movement leaves the travel, or if the model cannot be evaluated.
-pub fn analyse(session: &Session, options: &PlanOptions) -> Result<PlanAnalysis, PlanError> {
+pub fn analyse(session: &Session, options: &PlanOptions) -> Result<PlanAnalysis, Diagnostic> {
     let (complete, noise) = prepared(session, options)?;
     let problem = states::problem_by_test(&complete, noise)?;
     let mut analysis = analyse_problem(&problem, options.reach_mm)?;
@@ -56,7 +56,7 @@ pub fn analyse(session: &Session, options: &PlanOptions) -> Result<PlanAnalysis,
 ///
 /// # Errors
 /// If a test has neither data nor a movement, or a movement leaves the travel.
-pub fn prepared(session: &Session, options: &PlanOptions) -> Result<(Session, Noise), PlanError> {
+pub fn prepared(session: &Session, options: &PlanOptions) -> Result<(Session, Noise), Diagnostic> {
     let is_measured = session.tests.iter().all(|test| test.readings.is_some());
     let session = if is_measured { abbe_identify::fit::with_lever(session, 1)? } else { session.clone() };
     let noise = match options.noise_mm {
@@ -71,7 +71,7 @@ pub fn prepared(session: &Session, options: &PlanOptions) -> Result<(Session, No
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-fn analyse_problem(problem: &Problem, travel_mm: f64) -> Result<PlanAnalysis, PlanError> {
+fn analyse_problem(problem: &Problem, travel_mm: f64) -> Result<PlanAnalysis, Diagnostic> {
     let list = &problem.parameters.list;
     let nominal = vec![0.0; list.len()];
     let linear = Linearisation::of(problem, &nominal)?;
@@ -173,7 +173,7 @@ fn leave_one_out(
     problem: &Problem,
     linear: &Linearisation,
     of_interest: &[usize],
-) -> Result<Vec<LeaveOneOut>, PlanError> {
+) -> Result<Vec<LeaveOneOut>, Diagnostic> {
     let list = &problem.parameters.list;
     if problem.tests.len() < 2 {
         return Ok(Vec::new());

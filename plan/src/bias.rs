@@ -12,7 +12,7 @@
 
 use std::collections::BTreeMap;
 
-use abbe_identify::IdentifyError;
+use abbe_identify::error;
 use abbe_identify::linear::{Linearisation, is_of_interest};
 use abbe_identify::numerics::ranking::largest_first;
 use abbe_identify::problem::Problem;
@@ -25,8 +25,6 @@ use abbe_trace::candidates::library;
 use faer::Mat;
 use schemars::JsonSchema;
 use serde::Serialize;
-
-use crate::PlanError;
 
 /// Highest order of the harmonics among the usual effects.
 const MAX_ORDER: f64 = 2.0;
@@ -99,7 +97,7 @@ impl BiasTable {
 ///
 /// # Errors
 /// If the library cannot be read.
-pub fn usual_effects(problem: &Problem) -> Result<Vec<Effect>, PlanError> {
+pub fn usual_effects(problem: &Problem) -> Result<Vec<Effect>, Diagnostic> {
     let candidates = library::candidates(problem)?.into_iter().map(|candidate| candidate.effect);
     Ok(candidates.filter(is_usual).collect())
 }
@@ -117,7 +115,7 @@ fn is_usual(effect: &Effect) -> bool {
 ///
 /// # Errors
 /// If the model or the columns of an effect cannot be computed.
-pub fn bias_table(problem: &Problem, effects: &[Effect]) -> Result<BiasTable, PlanError> {
+pub fn bias_table(problem: &Problem, effects: &[Effect]) -> Result<BiasTable, Diagnostic> {
     let list = &problem.parameters.list;
     let nominal = vec![0.0; list.len()];
     let linear = Linearisation::of(problem, &nominal)?;
@@ -134,7 +132,7 @@ pub fn bias_table(problem: &Problem, effects: &[Effect]) -> Result<BiasTable, Pl
             let (of, what) =
                 (format!("`{}`: a test of the plan", effect.id()), format!("column for `{}`", effect.driver));
             let remedy = "give the column, or leave the effect out".to_string();
-            return Err(IdentifyError::Missing { of, what, remedy }.into());
+            return Err(error::missing(of, what, remedy));
         };
         let mut changes = Mat::zeros(columns.rows(), set.count);
         columns.fill(&[&set], changes.as_mut());

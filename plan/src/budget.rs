@@ -15,10 +15,10 @@
 use faer::Mat;
 
 use super::results::{Contribution, CorrelatedWith};
-use crate::PlanError;
 use abbe_identify::linear::{Linearisation, is_of_interest, prior_u};
 use abbe_identify::numerics::ranking::largest_first;
 use abbe_identify::problem::Problem;
+use abbe_model::Diagnostic;
 
 /// Shares of the variance below this value are not listed.
 const MIN_SHARE: f64 = 1e-4;
@@ -85,7 +85,7 @@ pub fn correlation(covariance: &Mat<f64>, i: usize, j: usize) -> f64 {
 ///
 /// # Errors
 /// If the decomposition fails.
-pub fn conditional_u(linear: &Linearisation, of_interest: &[usize]) -> Result<Vec<f64>, PlanError> {
+pub fn conditional_u(linear: &Linearisation, of_interest: &[usize]) -> Result<Vec<f64>, Diagnostic> {
     let r = linear.marginal(of_interest)?;
     Ok((0..of_interest.len()).map(|j| 1.0 / (0..=j).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt()).collect())
 }

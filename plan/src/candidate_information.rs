@@ -4,12 +4,12 @@ use super::candidate_tests::CandidateTest;
 use super::design::information::{Root, SharedParameters, sum_of};
 use super::design::{Design, Goal};
 use super::test_variations::TestVariations;
-use crate::PlanError;
 use abbe_identify::linear::Linearisation;
 use abbe_identify::numerics::parallel;
 use abbe_identify::numerics::triangle::Triangle;
 use abbe_identify::parameters::{Parameter, Role};
 use abbe_identify::problem::Problem;
+use abbe_model::Diagnostic;
 use abbe_model::instrument::{Contact, SharedBy};
 use abbe_model::session::Test;
 
@@ -43,7 +43,7 @@ impl PreparedCandidates {
         tests: Vec<CandidateTest>,
         variations: &TestVariations,
         targets: &[usize],
-    ) -> Result<PreparedCandidates, PlanError> {
+    ) -> Result<PreparedCandidates, Diagnostic> {
         let list = &problem.parameters.list;
         let kept: Vec<usize> =
             (0..list.len()).filter(|j| !targets.contains(j) && may_be_shared(problem, &list[*j])).collect();
@@ -51,7 +51,7 @@ impl PreparedCandidates {
         let linear = Linearisation::of(problem, beta)?;
         let base = shared.root_of(problem, &linear)?;
         let ready = parallel::map(tests.len(), &|k| ready(problem, &shared, &tests[k], variations));
-        let ready: Vec<Vec<CandidateInformation>> = ready.into_iter().collect::<Result<_, PlanError>>()?;
+        let ready: Vec<Vec<CandidateInformation>> = ready.into_iter().collect::<Result<_, Diagnostic>>()?;
         Ok(PreparedCandidates { shared, base, candidates: ready.into_iter().flatten().collect() })
     }
 
@@ -105,7 +105,7 @@ fn ready(
     shared: &SharedParameters,
     candidate: &CandidateTest,
     variations: &TestVariations,
-) -> Result<Vec<CandidateInformation>, PlanError> {
+) -> Result<Vec<CandidateInformation>, Diagnostic> {
     let mut session = abbe_model::session::Session::clone(&problem.session);
     session.tests = vec![candidate.test.clone()];
     session.effects = Vec::new();

@@ -1,5 +1,6 @@
 //! Generates the candidate tests: ball position, swept axis, positions of the other axes, bar, and side.
 
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::instrument::Station;
 use abbe_model::instrument::ballbar::{BAR, BallBar};
@@ -11,7 +12,6 @@ use abbe_model::words::{counted, listed};
 use super::ball_positions::{BallPosition, axis_positions, ball_count, ball_positions, dot, norm, standing_positions};
 use super::sweep::{Sweep, sweep_of};
 use super::test_variations::TestVariations;
-use crate::PlanError;
 
 /// Least radius about the swept axis, mm. At smaller radii the bar hardly moves.
 const MIN_RADIUS_MM: f64 = 10.0;
@@ -34,7 +34,7 @@ pub(super) struct Draft {
 pub(super) const MAX_DRAFTS: usize = 100_000;
 
 /// The error of more combinations than [`MAX_DRAFTS`], with the lists whose lengths multiply.
-pub(super) fn too_many(found: String, variations: &TestVariations, with_bars: bool) -> PlanError {
+pub(super) fn too_many(found: String, variations: &TestVariations, with_bars: bool) -> Diagnostic {
     let lists = [
         counted(variations.bars_mm.len(), "bar"),
         counted(variations.radii_mm.len(), "distance of the ball from its axis"),
@@ -43,7 +43,7 @@ pub(super) fn too_many(found: String, variations: &TestVariations, with_bars: bo
         counted(variations.ranges.len(), "share of the range"),
     ];
     let remedy = format!("state fewer of the {}", listed(&lists[usize::from(!with_bars)..], "and"));
-    PlanError::TooMany { found, limit: MAX_DRAFTS, remedy }
+    crate::error::too_many(found, MAX_DRAFTS, remedy)
 }
 
 /// The largest possible number of combinations of the permitted choices, counted before any is made.

@@ -16,6 +16,7 @@ use std::collections::HashSet;
 use std::f64::consts::{PI, TAU};
 
 use abbe_identify::start;
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{BodyErrors, Machine};
 use abbe_model::frames::Point;
@@ -29,7 +30,6 @@ use abbe_model::words::{listed, number};
 use super::ball_positions::{BallPosition, axis_positions, ball_count, ball_positions, dot, standing_positions};
 use super::candidate_layout::{Draft, MAX_DRAFTS, too_many};
 use super::test_variations::TestVariations;
-use crate::PlanError;
 
 /// The name of a candidate, and of what is mounted for it.
 const PROPOSED: &str = "proposed";
@@ -73,7 +73,7 @@ pub(super) fn drafts(
     session: &Session,
     variations: &TestVariations,
     kind: InstrumentKind,
-) -> Result<Vec<Draft>, PlanError> {
+) -> Result<Vec<Draft>, Diagnostic> {
     let placed = start::stations(session, &session.tests);
     let mut templates: Vec<(&Test, &Station<f64>)> = Vec::new();
     for (test, station) in session.tests.iter().zip(&placed).rev().filter(|(test, _)| test.station.kind() == kind) {

@@ -8,6 +8,7 @@
 
 use std::sync::Arc;
 
+use abbe_model::Diagnostic;
 use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::{Session, Test, planned};
 use abbe_model::words::number;
@@ -17,7 +18,7 @@ use super::candidate_motions;
 use super::collision::{Bodies, Parts};
 use super::states;
 use super::test_variations::TestVariations;
-use crate::PlanError;
+use crate::error::NO_CANDIDATE_TEST;
 use abbe_identify::numerics::parallel;
 
 /// A candidate test.
@@ -37,7 +38,7 @@ pub struct CandidateTest {
 ///
 /// # Errors
 /// If there are too many, or none that the machine can perform.
-pub fn candidate_tests(session: &Session, variations: &TestVariations) -> Result<Vec<CandidateTest>, PlanError> {
+pub fn candidate_tests(session: &Session, variations: &TestVariations) -> Result<Vec<CandidateTest>, Diagnostic> {
     let mut kinds: Vec<InstrumentKind> = session.tests.iter().map(|test| test.station.kind()).collect();
     kinds.sort_by_key(|kind| kind.word());
     kinds.dedup();
@@ -53,13 +54,15 @@ pub fn candidate_tests(session: &Session, variations: &TestVariations) -> Result
     let finished = parallel::map(drafts.len(), &|k| finished(session, &bodies, variations, drafts[k].clone()));
     let tests: Vec<CandidateTest> = finished.into_iter().flatten().collect();
     if tests.is_empty() {
-        return Err(PlanError::NoCandidateTest);
+        let found = "no candidate test is feasible on this machine: the instrument reads no motion of its axes, no bar \
+                     reaches, the travel is too short, or no test clears the bodies of the machine";
+        return Err(Diagnostic::coded(NO_CANDIDATE_TEST, found));
     }
     Ok(tests)
 }
 
 /// The candidates of a ball bar.
-fn with_bar(session: &Session, variations: &TestVariations, last: &Test) -> Result<Vec<Draft>, PlanError> {
+fn with_bar(session: &Session, variations: &TestVariations, last: &Test) -> Result<Vec<Draft>, Diagnostic> {
     let count = draft_count(session, variations);
     if count > MAX_DRAFTS as f64 {
         return Err(too_many(format!("up to {} candidate tests", number(count)), variations, true));

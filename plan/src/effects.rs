@@ -11,13 +11,13 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use abbe_model::Diagnostic;
 use abbe_model::effect::shape::Harmonic;
 use abbe_model::effect::{Effect, Shape};
 use faer::{Mat, MatRef};
 
 use super::detectability::{POWER, SIGNIFICANCE, corrected};
 use super::results::{Bias, Detectability, EffectDetectability, EffectsAnalysis};
-use crate::PlanError;
 use abbe_identify::linear::{Linearisation, is_of_interest};
 use abbe_identify::numerics::parallel;
 use abbe_identify::numerics::power::noncentrality;
@@ -53,7 +53,7 @@ const MIN_BIAS: f64 = 1e-3;
 ///
 /// # Errors
 /// If the model or the library cannot be evaluated.
-pub fn effects(problem: &Problem) -> Result<EffectsAnalysis, PlanError> {
+pub fn effects(problem: &Problem) -> Result<EffectsAnalysis, Diagnostic> {
     let nominal = vec![0.0; problem.parameters.list.len()];
     let linear = Linearisation::of(problem, &nominal)?;
     let columns = Columns::new(problem, &nominal);
@@ -98,7 +98,7 @@ pub fn effects(problem: &Problem) -> Result<EffectsAnalysis, PlanError> {
             .collect()
     })
     .into_iter()
-    .collect::<Result<_, PlanError>>()?;
+    .collect::<Result<_, Diagnostic>>()?;
     Ok(EffectsAnalysis {
         significance_level: SIGNIFICANCE,
         power: POWER,
@@ -140,7 +140,7 @@ fn judge(
     products: &EffectProjection<'_>,
     greatest: f64,
     threshold: &[f64; 2],
-) -> Result<EffectDetectability, PlanError> {
+) -> Result<EffectDetectability, Diagnostic> {
     let session = &problem.session;
     let effect = &candidate.effect;
     let unit = ParameterUnit::of_effect(session, effect, 0);

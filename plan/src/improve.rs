@@ -1,6 +1,7 @@
 //! Selects the next tests from the candidate tests by their information ([`design`](super::design)). Nothing is refitted.
 
-use abbe_identify::IdentifyError;
+use abbe_identify::error;
+use abbe_model::Diagnostic;
 use abbe_model::document::print::Block;
 use abbe_model::document::test::Test as Document;
 use schemars::JsonSchema;
@@ -12,7 +13,6 @@ use super::design::information::{Root, SharedParameters};
 use super::design::{Design, Goal, bound};
 use super::proposal::{self, proposal};
 use super::test_variations::TestVariations;
-use crate::PlanError;
 use abbe_identify::numerics::ranking::smallest_first;
 use abbe_identify::problem::Problem;
 use abbe_trace::candidates::named;
@@ -126,7 +126,7 @@ pub fn separating(
     pair: [&str; 2],
     variations: &TestVariations,
     by_minute: bool,
-) -> Result<Improvement, PlanError> {
+) -> Result<Improvement, Diagnostic> {
     let mut both = problem.clone();
     for id in pair {
         named::add(&mut both, id)?;
@@ -144,13 +144,13 @@ pub fn improve(
     problem: &Problem,
     variations: &TestVariations,
     options: &ImproveOptions,
-) -> Result<Improvement, PlanError> {
+) -> Result<Improvement, Diagnostic> {
     let list = &problem.parameters.list;
     let tests = super::candidate_tests::candidate_tests(&problem.session, variations)?;
     let nominal = vec![0.0; list.len()];
     let targets = options.goal.targets(problem);
     if targets.is_empty() {
-        return Err(IdentifyError::NoUnknowns.into());
+        return Err(error::no_unknowns());
     }
     let prepared = PreparedCandidates::new(problem, &nominal, tests, variations, &targets)?;
     let shared = &prepared.shared;

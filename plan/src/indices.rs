@@ -11,9 +11,9 @@
 use faer::{Mat, MatRef};
 
 use super::results::Indices;
-use crate::PlanError;
 use abbe_identify::linear::Linearisation;
 use abbe_identify::numerics::solve::Svd;
+use abbe_model::Diagnostic;
 
 /// The indices of a plan.
 ///
@@ -24,7 +24,7 @@ pub fn indices(
     of_interest: &[usize],
     readings: usize,
     g_efficiency: f64,
-) -> Result<Indices, PlanError> {
+) -> Result<Indices, Diagnostic> {
     let errors = of_interest.len();
     let identifiable: Vec<usize> = of_interest.iter().copied().filter(|j| linear.rank.is_identifiable(*j)).collect();
     let m = identifiable.len();
@@ -38,7 +38,7 @@ pub fn indices(
 
 /// The indices from the triangular factor of the identifiable errors, in internal units. `size` is the physical size of
 /// each error.
-fn of_triangle(r: MatRef<'_, f64>, size: &[f64], readings: usize) -> Result<Indices, PlanError> {
+fn of_triangle(r: MatRef<'_, f64>, size: &[f64], readings: usize) -> Result<Indices, Diagnostic> {
     let m = size.len();
     let scaled = Mat::from_fn(m, m, |i, j| r[(i, j)] * size[j]);
     let sigma = Svd::of(scaled.as_ref())?.singular_values;

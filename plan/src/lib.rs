@@ -52,6 +52,5 @@ mod sweep;
 pub mod test_variations;
 
 pub use analysis::{PlanOptions, analyse, prepared};
-pub use error::PlanError;
 pub use separate::{SeparatingTest, SeparationAnalysis, separating_tests, separation};
 pub use statements::{PlanStatement, attainable};

@@ -4,10 +4,10 @@ use faer::Mat;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::PlanError;
 use abbe_identify::linear::{Linearisation, is_of_interest};
 use abbe_identify::problem::Problem;
 use abbe_identify::results::Interval;
+use abbe_model::Diagnostic;
 
 /// How far a sweep can shrink.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -36,7 +36,7 @@ const BISECTIONS: usize = 10;
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn shrinkages(problem: &Problem) -> Result<Vec<Shrinkage>, PlanError> {
+pub fn shrinkages(problem: &Problem) -> Result<Vec<Shrinkage>, Diagnostic> {
     let nominal = vec![0.0; problem.parameters.list.len()];
     let linear = Linearisation::of(problem, &nominal)?;
     let of_interest: Vec<usize> = (0..problem.parameters.list.len())
@@ -51,7 +51,7 @@ pub fn shrinkages(problem: &Problem) -> Result<Vec<Shrinkage>, PlanError> {
         let rest = linear.prior.clone().merged(others.map(|(_, triangle)| triangle));
         let rows = whitened(problem, test, axis)?;
         // The largest ratio of uncertainties at a share of the range, and its parameter.
-        let worst = |share: f64| -> Result<(f64, usize), PlanError> {
+        let worst = |share: f64| -> Result<(f64, usize), Diagnostic> {
             let (middle, half) = (0.5 * (low + high), 0.5 * share * (high - low) + 1e-9);
             let mut whole = rest.clone();
             for (positions, white) in rows.iter().filter(|_| share > 0.0) {
@@ -111,7 +111,7 @@ fn swept(problem: &Problem, test: usize) -> Option<(usize, f64, f64)> {
 }
 
 /// The whitened rows of a test, block by block, each with the position of an axis.
-fn whitened(problem: &Problem, test: usize, axis: usize) -> Result<Vec<PlacedRows>, PlanError> {
+fn whitened(problem: &Problem, test: usize, axis: usize) -> Result<Vec<PlacedRows>, Diagnostic> {
     let values = problem.slot_values(&vec![0.0; problem.parameters.list.len()]);
     let Some(readings) = &problem.tests[test].readings else {
         return Ok(Vec::new());

@@ -4,9 +4,9 @@
 use faer::Mat;
 
 use super::results::{Curve, Sensitivity};
-use crate::PlanError;
 use abbe_identify::numerics::parallel;
 use abbe_identify::problem::{Problem, RowBlock};
+use abbe_model::Diagnostic;
 
 /// Maximum number of points of a curve.
 const CURVE_POINTS: usize = 60;
@@ -36,7 +36,7 @@ struct BlockSensitivity {
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn sensitivities(problem: &Problem, beta: &[f64], covariance: &Mat<f64>) -> Result<Sensitivities, PlanError> {
+pub fn sensitivities(problem: &Problem, beta: &[f64], covariance: &Mat<f64>) -> Result<Sensitivities, Diagnostic> {
     let values = problem.slot_values(beta);
     let parameters = beta.len();
     let blocks = problem.blocks();
@@ -44,7 +44,7 @@ pub fn sensitivities(problem: &Problem, beta: &[f64], covariance: &Mat<f64>) -> 
         let rows = problem.rows(&values, &blocks[k])?;
         Ok(of_block(problem, &blocks[k], &rows, parameters, covariance))
     });
-    let parts: Vec<BlockSensitivity> = parts.into_iter().collect::<Result<_, PlanError>>()?;
+    let parts: Vec<BlockSensitivity> = parts.into_iter().collect::<Result<_, Diagnostic>>()?;
     let tests = problem.tests.len();
     let mut summary = vec![(0.0_f64, 0_usize, 0.0_f64); parameters];
     let mut curves = vec![vec![Vec::new(); tests]; parameters];

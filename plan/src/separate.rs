@@ -5,6 +5,7 @@
 //! every candidate test contains the coefficients of all alternatives. To remove one from the model, its columns are
 //! removed from the root. One evaluation of the candidate tests therefore serves all alternatives.
 
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 use abbe_model::session::Test;
 use faer::Mat;
@@ -16,7 +17,6 @@ use super::design::goal;
 use super::design::information::{Root, SharedParameters};
 use super::states;
 use super::test_variations::TestVariations;
-use crate::PlanError;
 use abbe_identify::numerics::parallel;
 use abbe_identify::numerics::ranking::{rounded, smallest_first};
 use abbe_identify::numerics::triangle::upper;
@@ -96,7 +96,7 @@ pub fn separation(
     coefficients: &[f64],
     alias: &Effect,
     variations: &TestVariations,
-) -> Result<Option<SeparationAnalysis>, PlanError> {
+) -> Result<Option<SeparationAnalysis>, Diagnostic> {
     let comparison =
         SeparationComparison::new(problem, beta, found, coefficients, std::slice::from_ref(alias), variations)?;
     let base = &comparison.prepared.base;
@@ -129,7 +129,7 @@ pub fn separating_tests(
     coefficients: &[f64],
     alternatives: &[Effect],
     variations: &TestVariations,
-) -> Result<Vec<SeparatingTest>, PlanError> {
+) -> Result<Vec<SeparatingTest>, Diagnostic> {
     if alternatives.is_empty() {
         return Ok(Vec::new());
     }
@@ -183,7 +183,7 @@ impl SeparationComparison {
         coefficients: &[f64],
         alternatives: &[Effect],
         variations: &TestVariations,
-    ) -> Result<SeparationComparison, PlanError> {
+    ) -> Result<SeparationComparison, Diagnostic> {
         let mut all = problem.clone();
         states::fold_by_test(&mut all);
         let mut values = beta.to_vec();

@@ -1,11 +1,12 @@
 //! Further tests that separate a found effect from its aliases.
 
-use abbe_identify::IdentifyError;
+use abbe_identify::error::INTERRUPTED;
+use abbe_model::Diagnostic;
 use abbe_model::document::print::Block;
 use abbe_model::document::test::Test as Document;
 use abbe_model::effect::Effect;
 
-use crate::PlanError;
+use crate::error::{NO_CANDIDATE_TEST, TOO_MANY};
 use crate::proposal::{self, proposal};
 use crate::separate::{AlternativeSeparation, SeparatingTest, separating_tests};
 use crate::test_variations::TestVariations;
@@ -28,7 +29,7 @@ pub fn separate_aliases(
     trace: &mut TraceOutcome,
     variations: &TestVariations,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<(), PlanError> {
+) -> Result<(), Diagnostic> {
     // The candidates of other instruments are many, and a search that proposes them for every effect takes longer than the
     // search for the effects: `separation` compares one pair.
     let has_bar = trace.after.session.tests.last().is_some_and(|test| test.station.bar().is_some());
@@ -38,7 +39,7 @@ pub fn separate_aliases(
     let interrupt = Interrupt(progress);
     let mut taken = Vec::new();
     for k in 0..trace.effects.len() {
-        match interrupt.check().map_err(PlanError::from).and_then(|()| tests_for(trace, k, variations)) {
+        match interrupt.check().and_then(|()| tests_for(trace, k, variations)) {
             Ok(tests) => {
                 let propose = |test: &SeparatingTest| {
                     proposal(&trace.after.session, &test.planned, &test.test, variations, &mut taken)
@@ -52,11 +53,7 @@ pub fn separate_aliases(
                     test.proposal = proposal;
                 }
             }
-            Err(
-                PlanError::NoCandidateTest
-                | PlanError::TooMany { .. }
-                | PlanError::Identify(IdentifyError::Interrupted),
-            ) => break,
+            Err(error) if [NO_CANDIDATE_TEST, TOO_MANY, INTERRUPTED].contains(&error.code) => break,
             Err(error) => return Err(error),
         }
     }
@@ -67,7 +64,7 @@ pub fn separate_aliases(
 }
 
 /// The tests that separate the `k`-th found effect from its aliases.
-fn tests_for(trace: &TraceOutcome, k: usize, variations: &TestVariations) -> Result<Vec<SeparatingTest>, PlanError> {
+fn tests_for(trace: &TraceOutcome, k: usize, variations: &TestVariations) -> Result<Vec<SeparatingTest>, Diagnostic> {
     let number = trace.before.parameters.effects.len() + k;
     let is_own = |role: &Role| matches!(role, Role::Coefficient { effect, .. } if *effect == number);
     let parameters = trace.after.parameters.list.iter().zip(&trace.after_fit.beta);

@@ -3,6 +3,7 @@
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{NextStep, Statements};
 use abbe_identify::statements::has_candidates;
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 use schemars::JsonSchema;
@@ -11,8 +12,8 @@ use serde::Serialize;
 use crate::design::Goal;
 use crate::improve::{ImproveOptions, improve};
 use crate::results::{Contribution, ErrorAnalysis, PlanAnalysis};
+use crate::states;
 use crate::test_variations::TestVariations;
-use crate::{PlanError, states};
 
 /// Whether a plan is good.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
@@ -44,9 +45,9 @@ pub fn attainable(problem: &Problem, step: NextStep) -> NextStep {
     })
 }
 
-fn attainable_of(step: NextStep, problem: impl FnOnce() -> Result<Problem, PlanError>) -> NextStep {
+fn attainable_of(step: NextStep, problem: impl FnOnce() -> Result<Problem, Diagnostic>) -> NextStep {
     let options = ImproveOptions { goal: Goal::WorstUncertainty, tests: 1, by_minute: false };
-    let helps = || Ok::<_, PlanError>(!improve(&problem()?, &TestVariations::default(), &options)?.steps.is_empty());
+    let helps = || Ok::<_, Diagnostic>(!improve(&problem()?, &TestVariations::default(), &options)?.steps.is_empty());
     // A search that fails proposes nothing either.
     if step == NextStep::Identify && !helps().unwrap_or(false) { NextStep::NoneHelps } else { step }
 }

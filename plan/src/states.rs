@@ -6,13 +6,12 @@ use abbe_identify::heldout::Folds;
 use abbe_identify::noise::{Noise, NoiseSource};
 use abbe_identify::problem::Problem;
 use abbe_identify::start;
+use abbe_model::Diagnostic;
 use abbe_model::instrument::Station;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test, motion, planned};
 use abbe_model::unit::Unit;
-
-use crate::PlanError;
 
 /// Assumed pause between two tests, s.
 const BETWEEN_TESTS_S: f64 = 120.0;
@@ -23,7 +22,7 @@ const BETWEEN_TESTS_S: f64 = 120.0;
 ///
 /// # Errors
 /// If a test has neither data nor a movement, or a movement leaves the travel.
-pub fn complete(session: &Session, planned_only: bool) -> Result<Session, PlanError> {
+pub fn complete(session: &Session, planned_only: bool) -> Result<Session, Diagnostic> {
     let mut complete = session.clone();
     let mut clock_s = 0.0;
     let placed = start::stations(session, &session.tests);
@@ -44,7 +43,7 @@ pub fn complete(session: &Session, planned_only: bool) -> Result<Session, PlanEr
 ///
 /// # Errors
 /// If the movement leaves the travel or there is none.
-pub fn planned(session: &Session, test: &Test, station: &Station<f64>) -> Result<Readings, PlanError> {
+pub fn planned(session: &Session, test: &Test, station: &Station<f64>) -> Result<Readings, Diagnostic> {
     let mut readings = planned::planned(&session.machine, test)?;
     let model = TestModel::new(Arc::clone(&session.machine), station.clone(), &readings);
     readings.observed = model.readings(&SlotValues::zero(model.slots()));
@@ -57,7 +56,7 @@ pub fn planned(session: &Session, test: &Test, station: &Station<f64>) -> Result
 ///
 /// # Errors
 /// See [`Problem::new`].
-pub fn problem_by_test(session: &Session, noise: Noise) -> Result<Problem, PlanError> {
+pub fn problem_by_test(session: &Session, noise: Noise) -> Result<Problem, Diagnostic> {
     let mut problem = Problem::new(session, noise, 0)?;
     fold_by_test(&mut problem);
     Ok(problem)
@@ -93,7 +92,7 @@ pub(crate) fn noise_warning(noise: &Noise, unit: Unit) -> Option<String> {
 ///
 /// # Errors
 /// If the data cannot be fitted.
-pub(crate) fn noise_of(session: &Session) -> Result<Noise, PlanError> {
+pub(crate) fn noise_of(session: &Session) -> Result<Noise, Diagnostic> {
     if let Some(sigma) = session.stated_noise_mm() {
         return Ok(Noise::white(sigma, NoiseSource::Stated));
     }

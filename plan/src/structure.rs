@@ -23,6 +23,7 @@ use abbe_identify::numerics::rank::Rank;
 use abbe_identify::numerics::solve::Svd;
 use abbe_identify::numerics::triangle::Triangle;
 use abbe_identify::problem::Problem;
+use abbe_model::Diagnostic;
 use abbe_model::instrument::SharedBy;
 use abbe_model::session::{Session, Test};
 use faer::Mat;
@@ -32,7 +33,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::states;
-use crate::PlanError;
 
 /// Number of random geometries.
 const GEOMETRIES: u64 = 3;
@@ -80,7 +80,7 @@ pub struct BaseParameter {
 ///
 /// # Errors
 /// If the model cannot be evaluated at the geometry of the plan.
-pub fn structure(problem: &Problem) -> Result<Structure, PlanError> {
+pub fn structure(problem: &Problem) -> Result<Structure, Diagnostic> {
     let list = &problem.parameters.list;
     let linear = Linearisation::of(problem, &vec![0.0; list.len()])?;
     let alone = Rank::decide(&linear.readings, &linear.size, &linear.preference)?;
@@ -97,7 +97,7 @@ pub fn structure(problem: &Problem) -> Result<Structure, PlanError> {
 }
 
 /// The rank of noise-free readings.
-fn rank_of(readings: &Triangle, size: &[f64]) -> Result<usize, PlanError> {
+fn rank_of(readings: &Triangle, size: &[f64]) -> Result<usize, Diagnostic> {
     let r = readings.r();
     Ok(Svd::of(Mat::from_fn(r.nrows(), r.ncols(), |i, j| r[(i, j)] * size[j]).as_ref())?.numerical_rank())
 }

@@ -76,7 +76,7 @@ impl Analysis {
             let given: Vec<Given<'_>> = given.collect();
             let listener =
                 |step: Progress| step.words().map_or_else(|| caller.should_continue(), |words| caller.report(words));
-            analysis::run::<Failed>(&name, &given, &options, seed, &listener)
+            Ok(analysis::run(&name, &given, &options, seed, &listener)?)
         })?;
         Ok(Analysis { sessions, origin, analysed })
     }

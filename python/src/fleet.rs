@@ -8,18 +8,12 @@ use abbe::fleet::history;
 use abbe::fleet::options::Options;
 use abbe::fleet::store::{IfClaimed, Store};
 use abbe::fleet::unit::{self, Done, Places};
-use abbe::fleet::{FleetError, compensations, list, study};
+use abbe::fleet::{compensations, list, study};
 use pyo3::prelude::*;
 use serde::Serialize;
 
 use crate::failed::Failed;
 use crate::work;
-
-impl From<FleetError> for Failed {
-    fn from(error: FleetError) -> Failed {
-        Failed::new(error.to_string())
-    }
-}
 
 fn json(result: &impl Serialize) -> Result<String, Failed> {
     serde_json::to_string(result).map_err(|cause| Failed::new(format!("the result cannot be written: {cause}")))

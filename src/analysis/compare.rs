@@ -3,10 +3,10 @@
 use abbe_apply::compare::results::Comparison;
 use abbe_apply::compare::workspace::PLACES;
 use abbe_apply::compare::{CompareOptions, Input, SIGNIFICANCE, compare_inputs};
-use abbe_identify::IdentifyError;
+use abbe_model::Diagnostic;
 use serde::{Deserialize, Serialize};
 
-use super::{Analysis, Fault, Found, Given, Listener, unusable};
+use super::{Analysis, Found, Given, Listener, unusable};
 use crate::document::{Call, Document, Origin, Stated, StatedComparison};
 use crate::report;
 use crate::report::block::Report;
@@ -57,7 +57,7 @@ impl Analysis for Compared {
     const NAME: &'static str = "compare";
     type Options = ComparisonOptions;
 
-    fn run<E: Fault>(given: &[Given<'_>], options: &ComparisonOptions, seed: u64, _: Listener<'_>) -> Result<Self, E> {
+    fn run(given: &[Given<'_>], options: &ComparisonOptions, seed: u64, _: Listener<'_>) -> Result<Self, Diagnostic> {
         if given.len() < 2 || given.len() != options.names.len() {
             return Err(unusable("at least two inputs, each with its name, are expected".to_string(), ""));
         }
@@ -88,7 +88,7 @@ impl Found for Compared {
         Document::new(call, origin, seed, &self.stated()).text()
     }
 
-    fn report(&self, commands: &Commands, _: bool) -> Result<Report, IdentifyError> {
+    fn report(&self, commands: &Commands, _: bool) -> Result<Report, Diagnostic> {
         Ok(self.shown(commands))
     }
 

@@ -1,15 +1,15 @@
 //! The fit of a session.
 
-use abbe_identify::IdentifyError;
 use abbe_identify::fit::{Fit, assume};
 use abbe_identify::plausibility::accepted;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{Estimate, Statements};
+use abbe_model::Diagnostic;
 use abbe_plan::attainable;
 use abbe_trace::SessionFit;
 use serde::{Deserialize, Serialize};
 
-use super::{Analysis, Fault, Found, Given, Listener, session_of};
+use super::{Analysis, Found, Given, Listener, session_of};
 use crate::document::{Call, Document, Origin, Stated, StatedFit};
 use crate::report;
 use crate::report::block::Report;
@@ -37,8 +37,8 @@ impl Analysis for SessionFit {
     const NAME: &'static str = "fit";
     type Options = FitOptions;
 
-    fn run<E: Fault>(given: &[Given<'_>], options: &FitOptions, seed: u64, _: Listener<'_>) -> Result<Self, E> {
-        let found = SessionFit::of(&assume(session_of::<E>(given)?, &options.assume)?, seed)?;
+    fn run(given: &[Given<'_>], options: &FitOptions, seed: u64, _: Listener<'_>) -> Result<Self, Diagnostic> {
+        let found = SessionFit::of(&assume(session_of(given)?, &options.assume)?, seed)?;
         if !options.allow_implausible {
             accepted(&found.result.plausibility)?;
         }
@@ -51,7 +51,7 @@ impl Found for SessionFit {
         Document::new(call, origin, seed, &stated(self)).text()
     }
 
-    fn report(&self, commands: &Commands, figures: bool) -> Result<Report, IdentifyError> {
+    fn report(&self, commands: &Commands, figures: bool) -> Result<Report, Diagnostic> {
         report::fit::report(&self.problem, &self.fit, &stated(self), commands, figures)
     }
 

@@ -11,14 +11,11 @@ mod validate;
 
 use std::any::Any;
 
-use abbe_apply::ApplyError;
-use abbe_identify::IdentifyError;
 use abbe_identify::fit::Fit;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::problem::Problem;
-use abbe_model::ModelError;
+use abbe_model::Diagnostic;
 use abbe_model::session::Session;
-use abbe_plan::PlanError;
 pub use abbe_trace::Progress;
 use abbe_trace::{SessionFit, TraceOutcome};
 pub use compare::{Compared, ComparisonOptions};
@@ -47,11 +44,6 @@ pub enum Given<'g> {
 /// Hears what is done, and answers whether to go on.
 pub type Listener<'l> = &'l (dyn Fn(Progress) -> bool + Sync);
 
-/// The error of a caller, which those of all crates become.
-pub trait Fault: From<IdentifyError> + From<PlanError> + From<ApplyError> + From<String> {}
-
-impl<E: From<IdentifyError> + From<PlanError> + From<ApplyError> + From<String>> Fault for E {}
-
 /// An analysis.
 pub trait Analysis: Found + Sized {
     /// The name of its command.
@@ -64,12 +56,8 @@ pub trait Analysis: Found + Sized {
     ///
     /// # Errors
     /// If something else is given than the analysis takes, or it cannot be analysed.
-    fn run<E: Fault>(
-        given: &[Given<'_>],
-        options: &Self::Options,
-        seed: u64,
-        listener: Listener<'_>,
-    ) -> Result<Self, E>;
+    fn run(given: &[Given<'_>], options: &Self::Options, seed: u64, listener: Listener<'_>)
+    -> Result<Self, Diagnostic>;
 }
 
 /// What an analysis found.
@@ -84,7 +72,7 @@ pub trait Found: Any + Send + Sync {
     ///
     /// # Errors
     /// If the model cannot be evaluated.
-    fn report(&self, commands: &Commands, figures: bool) -> Result<Report, IdentifyError>;
+    fn report(&self, commands: &Commands, figures: bool) -> Result<Report, Diagnostic>;
 
     /// The tables of the figures that the result is about.
     fn tables(&self) -> Vec<Table>;
@@ -119,34 +107,27 @@ pub struct Analysed {
 }
 
 /// An analysis for a caller that chooses it by name: the options are a JSON object.
-struct Line<E> {
+struct Line {
     name: &'static str,
-    run: fn(&[Given<'_>], &str, u64, Listener<'_>) -> Result<(Map<String, Value>, Box<dyn Found>), E>,
+    run: fn(&[Given<'_>], &str, u64, Listener<'_>) -> Result<(Map<String, Value>, Box<dyn Found>), Diagnostic>,
 }
 
-fn line<A: Analysis, E: Fault>() -> Line<E> {
+fn line<A: Analysis>() -> Line {
     Line {
         name: A::NAME,
         run: |given, options, seed, listener| {
-            let unusable = |cause: serde_json::Error| {
-                unusable::<E>(format!("an option of `{}` cannot be used: {cause}", A::NAME), "")
-            };
+            let unusable =
+                |cause: serde_json::Error| unusable(format!("an option of `{}` cannot be used: {cause}", A::NAME), "");
             let options: A::Options = serde_json::from_str(options).map_err(unusable)?;
             let stated = stated(&options).map_err(unusable)?;
-            Ok((stated, Box::new(A::run::<E>(given, &options, seed, listener)?)))
+            Ok((stated, Box::new(A::run(given, &options, seed, listener)?)))
         },
     }
 }
 
 /// The analyses.
-fn lines<E: Fault>() -> [Line<E>; 5] {
-    [
-        line::<SessionFit, E>(),
-        line::<TraceOutcome, E>(),
-        line::<Plan, E>(),
-        line::<Validated, E>(),
-        line::<Compared, E>(),
-    ]
+fn lines() -> [Line; 5] {
+    [line::<SessionFit>(), line::<TraceOutcome>(), line::<Plan>(), line::<Validated>(), line::<Compared>()]
 }
 
 /// The options that differ from those of a call that states none.
@@ -164,26 +145,26 @@ pub fn stated<O: Default + Serialize>(options: &O) -> serde_json::Result<Map<Str
 ///
 /// # Errors
 /// If there is no such analysis or option, and as [`Analysis::run`].
-pub fn run<E: Fault>(
+pub fn run(
     name: &str,
     given: &[Given<'_>],
     options: &str,
     seed: u64,
     listener: Listener<'_>,
-) -> Result<Analysed, E> {
-    let line = lines::<E>().into_iter().find(|line| line.name == name);
-    let line = line.ok_or_else(|| E::from(format!("there is no analysis `{name}`")))?;
+) -> Result<Analysed, Diagnostic> {
+    let line = lines().into_iter().find(|line| line.name == name);
+    let line = line.ok_or_else(|| Diagnostic::other(format!("there is no analysis `{name}`")))?;
     let (options, found) = (line.run)(given, options, seed, listener)?;
     Ok(Analysed { call: Call { command: name.to_string(), options }, seed, found })
 }
 
 /// An option or an input that cannot be used, and what is expected.
-fn unusable<E: Fault>(message: String, expected: &str) -> E {
-    IdentifyError::from(ModelError::Session { message, help: expected.to_string() }).into()
+fn unusable(message: String, expected: &str) -> Diagnostic {
+    Diagnostic::session(message, expected)
 }
 
 /// The session of an analysis that takes one.
-fn session_of<'g, E: Fault>(given: &[Given<'g>]) -> Result<&'g Session, E> {
+fn session_of<'g>(given: &[Given<'g>]) -> Result<&'g Session, Diagnostic> {
     match given {
         [Given::Session(session)] => Ok(session),
         _ => Err(unusable("one session is expected".to_string(), "")),
@@ -203,7 +184,7 @@ impl Analysed {
     ///
     /// # Errors
     /// If the result has none, or it is incomplete.
-    pub fn model<E: Fault>(&self, origin: &Origin) -> Result<IdentifiedModel, E> {
+    pub fn model(&self, origin: &Origin) -> Result<IdentifiedModel, Diagnostic> {
         if let Some(why) = self.found.incomplete() {
             return Err(format!("no model: {why}, and effects may be missing from it").into());
         }

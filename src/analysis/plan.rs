@@ -1,15 +1,15 @@
 //! What planned tests identify, and how surely.
 
-use abbe_identify::IdentifyError;
 use abbe_identify::problem::Problem;
+use abbe_model::Diagnostic;
 use abbe_model::session::limits::{LARGEST, MIN_UM};
 use abbe_model::session::{Prior, Session};
 use abbe_model::unit::InternalUnit;
 use abbe_plan::results::PlanAnalysis;
-use abbe_plan::{PlanError, PlanOptions, analyse, collision, prepared, states};
+use abbe_plan::{PlanOptions, analyse, collision, prepared, states};
 use serde::{Deserialize, Serialize};
 
-use super::{Analysis, Fault, Found, Given, Listener, session_of, unusable};
+use super::{Analysis, Found, Given, Listener, session_of, unusable};
 use crate::document::{Call, Document, Origin, Stated, StatedPlan};
 use crate::report::block::Report;
 use crate::report::commands::Commands;
@@ -61,7 +61,7 @@ pub struct Plan {
 ///
 /// # Errors
 /// If the session cannot become a problem.
-pub fn problem_of(session: &Session, options: &PlanOptions) -> Result<Problem, PlanError> {
+pub fn problem_of(session: &Session, options: &PlanOptions) -> Result<Problem, Diagnostic> {
     let (complete, noise) = prepared(session, options)?;
     states::problem_by_test(&complete, noise)
 }
@@ -71,7 +71,7 @@ impl Plan {
     ///
     /// # Errors
     /// If the model cannot be evaluated.
-    pub fn of(session: &Session, problem: Problem, options: &PlanOptions) -> Result<Plan, PlanError> {
+    pub fn of(session: &Session, problem: Problem, options: &PlanOptions) -> Result<Plan, Diagnostic> {
         let mut analysis = analyse(session, options)?;
         analysis.warnings.extend(collision::unchecked(session, options.planned_only));
         Ok(Plan { problem, analysis })
@@ -87,7 +87,7 @@ impl Plan {
     ///
     /// # Errors
     /// If the model cannot be evaluated.
-    pub fn sensitivity(&self, test: &str) -> Result<Option<Vec<f64>>, IdentifyError> {
+    pub fn sensitivity(&self, test: &str) -> Result<Option<Vec<f64>>, Diagnostic> {
         let problem = &self.problem;
         let Some(number) = problem.tests.iter().position(|known| known.name == test) else { return Ok(None) };
         let list = &problem.parameters.list;
@@ -112,8 +112,8 @@ impl Analysis for Plan {
     const NAME: &'static str = "plan";
     type Options = PlanningOptions;
 
-    fn run<E: Fault>(given: &[Given<'_>], options: &PlanningOptions, _: u64, _: Listener<'_>) -> Result<Self, E> {
-        let mut session = session_of::<E>(given)?.clone();
+    fn run(given: &[Given<'_>], options: &PlanningOptions, _: u64, _: Listener<'_>) -> Result<Self, Diagnostic> {
+        let mut session = session_of(given)?.clone();
         let lengths = [
             ("noise_um", options.noise_um, "the standard deviation of a reading"),
             ("setup_um", options.setup_um, "the standard uncertainty of a set-up length"),
@@ -141,7 +141,7 @@ impl Found for Plan {
         Document::new(call, origin, seed, &self.stated()).text()
     }
 
-    fn report(&self, commands: &Commands, figures: bool) -> Result<Report, IdentifyError> {
+    fn report(&self, commands: &Commands, figures: bool) -> Result<Report, Diagnostic> {
         present::analysis::report(&self.problem, &self.stated(), commands, figures)
     }
 

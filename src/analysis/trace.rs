@@ -4,11 +4,11 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use abbe_identify::IdentifyError;
 use abbe_identify::fit::Fit;
 use abbe_identify::plausibility::accepted;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::Statements;
+use abbe_model::Diagnostic;
 use abbe_plan::attainable;
 use abbe_plan::separating_tests::separate_aliases;
 use abbe_plan::test_variations::TestVariations;
@@ -16,7 +16,7 @@ use abbe_trace::{Progress, TraceOptions, TraceOutcome, trace};
 use serde::{Deserialize, Serialize};
 
 use super::fit::estimates;
-use super::{Analysis, Fault, Found, Given, Listener, session_of, unusable};
+use super::{Analysis, Found, Given, Listener, session_of, unusable};
 use crate::document::{Call, Document, Origin, Stated, StatedTrace};
 use crate::report;
 use crate::report::block::Report;
@@ -80,18 +80,18 @@ impl Analysis for TraceOutcome {
     const NAME: &'static str = "trace";
     type Options = SearchOptions;
 
-    fn run<E: Fault>(
+    fn run(
         given: &[Given<'_>],
         options: &SearchOptions,
         seed: u64,
         listener: Listener<'_>,
-    ) -> Result<Self, E> {
+    ) -> Result<Self, Diagnostic> {
         if let Some(seconds) = options.time_limit.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
             return Err(unusable(format!("`time_limit` is {seconds}"), "a positive number of seconds is expected"));
         }
         let limit = options.time_limit.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
         let end = limit.and_then(|limit| Instant::now().checked_add(limit));
-        let refused: Mutex<Option<IdentifyError>> = Mutex::new(None);
+        let refused: Mutex<Option<Diagnostic>> = Mutex::new(None);
         let stopped = AtomicBool::new(false);
         let report = |progress: Progress| {
             if let Progress::Contradicted(found) = &progress
@@ -106,7 +106,7 @@ impl Analysis for TraceOutcome {
             stopped.fetch_or(!goes_on, Ordering::Relaxed);
             goes_on && end.is_none_or(|end| Instant::now() < end)
         };
-        let mut found = trace(session_of::<E>(given)?, &options.with_seed(seed), &report)?;
+        let mut found = trace(session_of(given)?, &options.with_seed(seed), &report)?;
         if let Some(error) = refused.lock().ok().and_then(|mut refused| refused.take()) {
             return Err(error.into());
         }
@@ -124,7 +124,7 @@ impl Found for TraceOutcome {
         Document::new(call, origin, seed, &stated(self)).text()
     }
 
-    fn report(&self, commands: &Commands, figures: bool) -> Result<Report, IdentifyError> {
+    fn report(&self, commands: &Commands, figures: bool) -> Result<Report, Diagnostic> {
         report::trace::report(self, &stated(self), commands, figures)
     }
 

@@ -1,13 +1,13 @@
 //! A saved model against the readings of a session that it never saw.
 
 use abbe_apply::compare::workspace::rms_of_moved;
-use abbe_identify::IdentifyError;
 use abbe_identify::results::Statements;
+use abbe_model::Diagnostic;
 use abbe_model::component::ErrorName;
 use abbe_trace::validate::{Validation, validate_anew};
 use serde::{Deserialize, Serialize};
 
-use super::{Analysis, Fault, Found, Given, Listener, unusable};
+use super::{Analysis, Found, Given, Listener, unusable};
 use crate::document::{Call, Document, Origin, Stated, StatedValidation};
 use crate::report::block::Report;
 use crate::report::commands::Commands;
@@ -46,7 +46,7 @@ impl Analysis for Validated {
     const NAME: &'static str = "validate";
     type Options = ValidationOptions;
 
-    fn run<E: Fault>(given: &[Given<'_>], options: &ValidationOptions, _: u64, _: Listener<'_>) -> Result<Self, E> {
+    fn run(given: &[Given<'_>], options: &ValidationOptions, _: u64, _: Listener<'_>) -> Result<Self, Diagnostic> {
         let [Given::Model(model), Given::Session(session)] = given else {
             return Err(unusable("a model and a session are expected".to_string(), ""));
         };
@@ -69,7 +69,7 @@ impl Found for Validated {
         Document::new(call, origin, seed, &self.stated()).text()
     }
 
-    fn report(&self, commands: &Commands, _: bool) -> Result<Report, IdentifyError> {
+    fn report(&self, commands: &Commands, _: bool) -> Result<Report, Diagnostic> {
         Ok(present::report(&self.machine, &self.validation, &self.stated(), commands))
     }
 

@@ -7,11 +7,11 @@ mod write;
 
 use abbe_files::Source;
 use abbe_files::read::lowered;
-use abbe_identify::IdentifyError;
+use abbe_identify::error;
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::FitResult;
-use abbe_model::ModelError;
+use abbe_model::Diagnostic;
 use abbe_model::calendar;
 use abbe_model::document::fault::Fault;
 use abbe_model::session::Session;
@@ -194,7 +194,7 @@ temperature_c = [19.6, 20.3]
 /// # Errors
 /// With file, line and key: a key that is unknown or absent, an empty text, a country or language that is no code of two
 /// letters, a day that is none, an end before its begin.
-pub fn read(source: &Source) -> Result<Certificate, ModelError> {
+pub fn read(source: &Source) -> Result<Certificate, Diagnostic> {
     lowered(source, |certificate: &Certificate| {
         check(certificate)?;
         Ok(certificate.clone())
@@ -306,13 +306,13 @@ impl<'c> Stated<'c> {
     ///
     /// # Errors
     /// If neither states a serial number and a day, or the last day is before the first.
-    pub fn of(certificate: &'c Certificate, session: &Session) -> Result<Stated<'c>, IdentifyError> {
+    pub fn of(certificate: &'c Certificate, session: &Session) -> Result<Stated<'c>, Diagnostic> {
         let about = |name: &str| session.about.iter().find(|(known, _)| known == name).map(|(_, text)| text.as_str());
         let lacking = |key: &str, table: &str, note: &str| {
             let remedy = format!(
                 "state it in `[{table}]` of the file of the certificate, or as `{note}` in `[about]` of the session"
             );
-            IdentifyError::Missing { of: "the certificate".to_string(), what: key.to_string(), remedy }
+            error::missing("the certificate", key, remedy)
         };
         let head = &certificate.certificate;
         let begin = match &head.begin {
@@ -325,7 +325,7 @@ impl<'c> Stated<'c> {
         if end < begin {
             let (one, other) = (format!("`end` on {end}"), format!("`begin` on {begin}"));
             let remedy = "the measurement ends after it begins";
-            return Err(IdentifyError::Contradictory { one, other, remedy });
+            return Err(error::contradictory(one, other, remedy));
         }
         let noted = about("serial_number").map(str::trim).filter(|number| is_text(number));
         let number = certificate.item.serial_number.as_deref().or(noted);
@@ -340,8 +340,8 @@ impl<'c> Stated<'c> {
     /// # Errors
     /// If the readings contradict the session, if the model lacks an effect or that cannot be judged, or if no error is
     /// determined.
-    pub fn xml(&self, problem: &Problem, result: &FitResult) -> Result<String, IdentifyError> {
-        let refused = |why| Err(IdentifyError::NoCertificate { why });
+    pub fn xml(&self, problem: &Problem, result: &FitResult) -> Result<String, Diagnostic> {
+        let refused = |why| Err(Diagnostic::identification(format!("there is no certificate: {why}")));
         if let Some(why) = result.model.outcome.goodness.forbids_decisions() {
             return refused(why);
         }
@@ -370,6 +370,6 @@ impl<'c> Stated<'c> {
             coefficients,
             open,
         })
-        .map_err(|cause| IdentifyError::Write { what: "the certificate", cause })
+        .map_err(|cause| error::not_written("the certificate", cause))
     }
 }

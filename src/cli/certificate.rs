@@ -7,10 +7,10 @@ use abbe::files;
 use abbe::files::stamp::FileStamp;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::FitResult;
+use abbe::model::Diagnostic;
 use abbe::model::session::Session;
 use clap::Args;
 
-use super::failure::Failure;
 use super::output::{self, Outputs};
 
 /// The name of the file of administrative data beside the session.
@@ -45,7 +45,7 @@ impl CertificateArguments {
     ///
     /// # Errors
     /// If there is no file of it, with an example, if the file has a fault, or if an output would replace it.
-    pub fn read(&self, session: &Path, outputs: &Outputs) -> Result<Option<Wanted<'_>>, Failure> {
+    pub fn read(&self, session: &Path, outputs: &Outputs) -> Result<Option<Wanted<'_>>, Diagnostic> {
         let Some(file) = &self.dcc else { return Ok(None) };
         let place = match &self.certificate {
             Some(place) => place.clone(),
@@ -53,7 +53,7 @@ impl CertificateArguments {
         };
         outputs.refuse_overwrite([place.as_path()])?;
         if self.certificate.is_none() && !place.exists() {
-            return Err(Failure::Other(format!(
+            return Err(Diagnostic::other(format!(
                 "{}: `--dcc` needs the administrative data of the certificate; write this file, for example\n\n{EXAMPLE}",
                 place.display()
             )));
@@ -68,12 +68,12 @@ impl Wanted<'_> {
     ///
     /// # Errors
     /// If neither the file nor the session states a day and a serial number.
-    pub fn of(&self, session: &Session) -> Result<Stated<'_>, Failure> {
+    pub fn of(&self, session: &Session) -> Result<Stated<'_>, Diagnostic> {
         Ok(Stated::of(&self.data, session)?)
     }
 
     /// Writes the certificate.
-    pub fn write(&self, stated: &Stated, problem: &Problem, result: &FitResult) -> Result<(), Failure> {
+    pub fn write(&self, stated: &Stated, problem: &Problem, result: &FitResult) -> Result<(), Diagnostic> {
         output::write_whole(self.file, stated.xml(problem, result)?.as_bytes())
     }
 }

@@ -6,10 +6,11 @@ use abbe::analysis::{Analysis, Compared, ComparisonOptions, Given};
 use abbe::files::stamp::FileStamp;
 use abbe::files::{self, ReadOptions, SourceMap};
 use abbe::identify::model_file::{self, IdentifiedModel};
+use abbe::model::Diagnostic;
 use abbe::model::session::Session;
 use clap::Args;
 
-use super::failure::Failure;
+use super::failure::command_line;
 use super::output::Outputs;
 use super::results::Read;
 use super::{CommonArguments, DataArguments, Global, PlausibilityArguments, repeated};
@@ -38,24 +39,22 @@ pub struct CompareArguments {
 }
 
 /// Runs `abbe compare`.
-pub fn run(arguments: &CompareArguments, _: Global) -> Result<(), Failure> {
+pub fn run(arguments: &CompareArguments, _: Global) -> Result<(), Diagnostic> {
     let ComparisonOptions { significance: found, places, .. } = arguments.options;
     if !(found > 0.0 && found < 1.0) {
-        return Err(Failure::CommandLine(format!(
-            "`--significance {found}`: a probability between 0 and 1 is expected"
-        )));
+        return Err(command_line(format!("`--significance {found}`: a probability between 0 and 1 is expected")));
     }
     if places > 100 {
-        return Err(Failure::CommandLine(format!("`--places {places}`: 100 is the most")));
+        return Err(command_line(format!("`--places {places}`: 100 is the most")));
     }
     let common = &arguments.common;
     let outputs = common.output.prepared(&[])?;
     if arguments.inputs.len() < 2 {
-        return Err(Failure::CommandLine("at least two sessions or models are expected; name another".into()));
+        return Err(command_line("at least two sessions or models are expected; name another"));
     }
     if arguments.plausibility.allow_implausible && !arguments.repeated {
         let message = "`--allow-implausible` belongs to `--repeated`; state both or none";
-        return Err(Failure::CommandLine(message.into()));
+        return Err(command_line(message));
     }
     if arguments.repeated {
         return repeated::run(&arguments.inputs, &arguments.data, arguments.plausibility, common, &outputs);
@@ -66,7 +65,7 @@ pub fn run(arguments: &CompareArguments, _: Global) -> Result<(), Failure> {
     let names = arguments.inputs.iter().map(|file| file.display().to_string()).collect();
     let options = ComparisonOptions { names, ..arguments.options.clone() };
     let given: Vec<Given<'_>> = inputs.iter().map(File::given).collect();
-    let found = Compared::run::<Failure>(&given, &options, common.seed, &|_| true)?;
+    let found = Compared::run(&given, &options, common.seed, &|_| true)?;
     let mut from = Read { seed: Some(common.seed), ..Read::default() };
     for input in &inputs {
         match input {
@@ -92,7 +91,7 @@ impl File {
     }
 }
 
-fn read(file: &Path, options: &ReadOptions, outputs: &Outputs) -> Result<File, Failure> {
+fn read(file: &Path, options: &ReadOptions, outputs: &Outputs) -> Result<File, Diagnostic> {
     let source = files::text(file, "the session or model")?;
     if model_file::is_model(&source.text) {
         outputs.refuse_overwrite([file])?;

@@ -8,10 +8,11 @@ use abbe::apply::correction::stream::{self, Output, Summary};
 use abbe::files::{self, commands::CommandFile};
 use abbe::identify::model_file;
 use abbe::identify::model_file::errors::EstimatedErrors;
+use abbe::model::Diagnostic;
 use abbe::model::pose::Aim;
 use clap::Args;
 
-use super::failure::Failure;
+use super::failure::{stopped, unwritable};
 use super::interrupt::Interrupts;
 use super::results::{OutputArguments, Read};
 use super::{Global, output, values};
@@ -51,7 +52,7 @@ pub struct CompensateArguments {
 }
 
 /// Runs `abbe compensate`.
-pub fn run(arguments: &CompensateArguments, _: Global) -> Result<(), Failure> {
+pub fn run(arguments: &CompensateArguments, _: Global) -> Result<(), Diagnostic> {
     let outputs = arguments.output.prepared(&[Some(&arguments.out)])?;
     outputs.refuse_overwrite([arguments.model.as_path(), arguments.commands.as_path()])?;
     let source = files::text(&arguments.model, "the model file")?;
@@ -64,7 +65,7 @@ pub fn run(arguments: &CompensateArguments, _: Global) -> Result<(), Failure> {
     for text in &arguments.at {
         let name = text.split('=').next().unwrap_or_default().trim();
         if machine.axis_index(name).is_some_and(|axis| columns.contains(&Some(axis))) {
-            return Err(Failure::Other(format!(
+            return Err(Diagnostic::other(format!(
                 "--at {text}: the commands have a column for the positions of {name}; remove one of the two"
             )));
         }
@@ -77,10 +78,10 @@ pub fn run(arguments: &CompensateArguments, _: Global) -> Result<(), Failure> {
     let written = output::write_streaming(&arguments.out, |to| {
         let mut to = BufWriter::new(UntilInterrupted { to, interrupts: &interrupts });
         summary = stream::run(&correction, &mut file, wanted, &at, &mut to)?;
-        to.flush().map_err(|source| Failure::Write { path: arguments.out.display().to_string(), source })
+        to.flush().map_err(|source| unwritable(&arguments.out, source))
     });
     if interrupts.came() && written.is_err() {
-        return Err(Failure::Interrupted("interrupted; nothing is written".into()));
+        return Err(stopped("interrupted; nothing is written"));
     }
     written?;
     let of_model = arguments.tool_mm.is_empty();

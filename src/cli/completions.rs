@@ -1,8 +1,8 @@
 //! `abbe completions`: what a shell completes.
 
+use abbe::model::Diagnostic;
 use clap::{Args, CommandFactory};
 
-use super::failure::Failure;
 use super::{Arguments, Global, output};
 
 /// An example of `abbe completions`.
@@ -20,7 +20,7 @@ pub struct CompletionArguments {
 }
 
 /// Runs `abbe completions`.
-pub fn run(arguments: &CompletionArguments, _: Global) -> Result<(), Failure> {
+pub fn run(arguments: &CompletionArguments, _: Global) -> Result<(), Diagnostic> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut Arguments::command(), "abbe", &mut script);
     output::whole(String::from_utf8_lossy(&script).trim_end());

@@ -8,12 +8,12 @@ use abbe::codegen::print::{Audience, TestEquations};
 use abbe::codegen::{Checked, Equation, SessionTest, check};
 use abbe::equation;
 use abbe::files::{SourceMap, text};
+use abbe::model::Diagnostic;
 use abbe::model::session::{Session, Test};
 use clap::Args;
 
 use self::form::FormArguments;
 use super::Global;
-use super::failure::Failure;
 use super::message::{Kind, tell};
 use super::output::Outputs;
 
@@ -54,7 +54,7 @@ pub struct EquationArguments {
 
 impl EquationArguments {
     /// The test with its symbols.
-    fn source<'s>(&self, session: &'s Session, test: &'s Test) -> Result<SessionTest<'s>, Failure> {
+    fn source<'s>(&self, session: &'s Session, test: &'s Test) -> Result<SessionTest<'s>, Diagnostic> {
         let source = SessionTest::new(session, test)?;
         let symbols: &[String] = match self.symbols.as_deref() {
             None if self.form.language.keeps_symbols() => return Ok(source),
@@ -67,7 +67,7 @@ impl EquationArguments {
 }
 
 /// The session with its readings, or without them and with a note if they cannot be read.
-fn read(arguments: &super::SessionArguments) -> Result<(Session, SourceMap), Failure> {
+fn read(arguments: &super::SessionArguments) -> Result<(Session, SourceMap), Diagnostic> {
     let source = text(&arguments.session, "the session file")?;
     let (session, sources, fault) = equation::session(&source, &arguments.options())?;
     if let Some(fault) = fault {
@@ -78,7 +78,7 @@ fn read(arguments: &super::SessionArguments) -> Result<(Session, SourceMap), Fai
 }
 
 /// Runs `abbe equation`.
-pub fn run(arguments: &EquationArguments, _: Global) -> Result<(), Failure> {
+pub fn run(arguments: &EquationArguments, _: Global) -> Result<(), Diagnostic> {
     let form = &arguments.form;
     if arguments.all_tests && matches!(form.language.audience, Audience::Compilers | Audience::Algebra) {
         return files::write(arguments);
@@ -93,9 +93,9 @@ pub fn run(arguments: &EquationArguments, _: Global) -> Result<(), Failure> {
     }
     let of = |test, first: bool| form.of_test(&session, test, arguments.source(&session, test)?, first);
     let both = session.tests.iter().map(|test| Ok([of(test, false)?, of(test, true)?]));
-    let both: Vec<[(Equation, SessionTest<'_>); 2]> = both.collect::<Result<_, Failure>>()?;
+    let both: Vec<[(Equation, SessionTest<'_>); 2]> = both.collect::<Result<_, Diagnostic>>()?;
     let pairs = both.iter().map(|[whole, first]| Ok([check(&whole.0, &whole.1)?, check(&first.0, &first.1)?]));
-    let pairs: Vec<[Checked<'_>; 2]> = pairs.collect::<Result<_, Failure>>()?;
+    let pairs: Vec<[Checked<'_>; 2]> = pairs.collect::<Result<_, Diagnostic>>()?;
     let tests: Vec<TestEquations<'_>> =
         pairs.iter().map(|[equation, first]| TestEquations { equation, first }).collect();
     form.put(&form.language.print_system(&tests, &form.style.style(form.language)?)?)

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
 
-use abbe::model::error::Location;
+use abbe::model::diagnostic::Location;
 use abbe::model::words::{MAX_QUOTED, around};
 use ariadne::{Color, Config, IndexType, Label, Report, ReportKind, Source};
 

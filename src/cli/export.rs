@@ -9,10 +9,11 @@ use abbe::exports::{self, Contents};
 use abbe::files;
 use abbe::files::robot::dh::Convention;
 use abbe::identify::model_file;
+use abbe::model::Diagnostic;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
-use super::failure::Failure;
+use super::failure::command_line;
 use super::results::{OutputArguments, Read};
 use super::{Global, folder, output, values};
 use crate::report::export as present;
@@ -94,7 +95,7 @@ pub struct ExportArguments {
 }
 
 /// Runs `abbe export`.
-pub fn run(arguments: &ExportArguments, _: Global) -> Result<(), Failure> {
+pub fn run(arguments: &ExportArguments, _: Global) -> Result<(), Diagnostic> {
     let format = exports::format(&arguments.format)?;
     let outputs = arguments.output.prepared(&[Some(&arguments.out).filter(|_| !format.is_of_tables())])?;
     outputs.refuse_overwrite([arguments.model.as_path()])?;
@@ -104,7 +105,7 @@ pub fn run(arguments: &ExportArguments, _: Global) -> Result<(), Failure> {
     let options = arguments.options(&model)?;
     if let Some((option, owners)) = format.ignored(&options) {
         let owners: Vec<String> = owners.iter().map(|word| format!("`--as {word}`")).collect();
-        return Err(Failure::CommandLine(format!("`--{option}` belongs to {}", owners.join(" and "))));
+        return Err(command_line(format!("`--{option}` belongs to {}", owners.join(" and "))));
     }
     let exported = format.export(&model, &options)?;
     let mut written = vec![arguments.out.clone()];

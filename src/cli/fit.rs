@@ -2,10 +2,10 @@
 
 use abbe::analysis::FitOptions;
 use abbe::identify::{fit, propagation};
+use abbe::model::Diagnostic;
 use abbe::trace::SessionFit;
 use clap::Args;
 
-use super::failure::Failure;
 use super::forms::FormArguments;
 use super::method::{self, Method};
 use super::readings::ReadingArguments;
@@ -45,7 +45,7 @@ pub struct FitArguments {
 }
 
 /// Runs `abbe fit`.
-pub fn run(arguments: &FitArguments, _: Global) -> Result<(), Failure> {
+pub fn run(arguments: &FitArguments, _: Global) -> Result<(), Diagnostic> {
     let common = &arguments.common;
     let ReadingArguments { views, residuals } = &arguments.readings;
     let (save, dcc) = (&arguments.save.save, &arguments.certificate.dcc);

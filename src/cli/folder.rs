@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use abbe::model::Diagnostic;
 use abbe::temporary::{self, TemporaryFolder};
 
-use super::failure::Failure;
+use super::failure::{command_line, unwritable};
 use super::output;
 
 /// A file to write: its name in the folder, with the names of folders within it, and its contents.
@@ -18,9 +19,9 @@ pub fn write(
     folder: &Path,
     files: &[(String, impl AsRef<[u8]>)],
     force: bool,
-    check_files: impl FnOnce(&Path) -> Result<(), Failure>,
-) -> Result<(), Failure> {
-    let fault = |source| fault(folder, source);
+    check_files: impl FnOnce(&Path) -> Result<(), Diagnostic>,
+) -> Result<(), Diagnostic> {
+    let fault = |source| unwritable(folder, source);
     let present = check(folder, force)?;
     let parent = match folder.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -31,22 +32,21 @@ pub fn write(
     let made = TemporaryFolder::in_folder(parent).map_err(fault)?;
     let whole = made.path().join("whole");
     std::fs::create_dir(&whole).map_err(fault)?;
+    // An error names the final path, not the temporary one.
+    let final_path = |mut error: Diagnostic| {
+        if let Some(place) = &mut error.place
+            && let Ok(name) = place.file.strip_prefix(&whole)
+        {
+            place.file = folder.join(name);
+        }
+        error
+    };
     let make_folder_of = |file: &Path| file.parent().map_or(Ok(()), std::fs::create_dir_all).map_err(fault);
     for (name, contents) in files {
         make_folder_of(&whole.join(name))?;
-        // An error names the final path, not the temporary one.
-        output::write_whole(&whole.join(name), contents.as_ref()).map_err(|failure| match failure {
-            Failure::Write { source, .. } => self::fault(&folder.join(name), source),
-            other => other,
-        })?;
+        output::write_whole(&whole.join(name), contents.as_ref()).map_err(final_path)?;
     }
-    check_files(&whole).map_err(|failure| match failure {
-        Failure::Write { path, source } => match Path::new(&path).strip_prefix(&whole) {
-            Ok(name) => self::fault(&folder.join(name), source),
-            Err(_) => Failure::Write { path, source },
-        },
-        other => other,
-    })?;
+    check_files(&whole).map_err(final_path)?;
     if present {
         let move_file = |name: &Path| {
             make_folder_of(&folder.join(name))?;
@@ -67,7 +67,7 @@ pub fn write(
 /// # Errors
 /// If another file with one of the names and other contents exists, unless `force` allows to replace it. Nothing is written
 /// then.
-pub fn add(folder: &Path, files: &[(String, Vec<u8>)], read: &[PathBuf], force: bool) -> Result<(), Failure> {
+pub fn add(folder: &Path, files: &[(String, Vec<u8>)], read: &[PathBuf], force: bool) -> Result<(), Diagnostic> {
     let Some((last, others)) = files.split_last() else { return Ok(()) };
     let mut written: Vec<(PathBuf, &[u8])> = Vec::new();
     for (name, contents) in others {
@@ -78,10 +78,10 @@ pub fn add(folder: &Path, files: &[(String, Vec<u8>)], read: &[PathBuf], force: 
         match std::fs::read(&path) {
             Ok(present) if present == *contents => continue,
             Err(cause) if cause.kind() == std::io::ErrorKind::NotFound => {}
-            Err(source) => return Err(Failure::Write { path: path.display().to_string(), source }),
+            Err(source) => return Err(unwritable(&path, source)),
             Ok(_) if force => {}
             Ok(_) => {
-                return Err(Failure::Other(format!(
+                return Err(Diagnostic::other(format!(
                     "{}: a file with this name exists, and its contents are others; rename one of the two, or use --force to replace it",
                     path.display()
                 )));
@@ -93,25 +93,21 @@ pub fn add(folder: &Path, files: &[(String, Vec<u8>)], read: &[PathBuf], force: 
     written.into_iter().try_for_each(|(path, contents)| output::write_whole(&path, contents))
 }
 
-fn fault(folder: &Path, source: std::io::Error) -> Failure {
-    Failure::Write { path: folder.display().to_string(), source }
-}
-
 /// Whether the folder exists. `force` is the option of the user.
 ///
 /// # Errors
 /// If nothing may be written into the folder.
-pub fn check(folder: &Path, force: bool) -> Result<bool, Failure> {
+pub fn check(folder: &Path, force: bool) -> Result<bool, Diagnostic> {
     if folder.as_os_str() == "-" {
         let what = "`-` is standard output, which cannot contain a folder; name a folder";
-        return Err(Failure::CommandLine(what.into()));
+        return Err(command_line(what));
     }
     if folder.is_file() {
-        return Err(Failure::Other(format!("{}: this is a file; name a folder", folder.display())));
+        return Err(Diagnostic::other(format!("{}: this is a file; name a folder", folder.display())));
     }
     let present = folder.is_dir();
     if present && !force && std::fs::read_dir(folder).map_err(|source| fault(folder, source))?.next().is_some() {
-        return Err(Failure::Other(format!(
+        return Err(Diagnostic::other(format!(
             "{}: the folder exists and is not empty; name another, or use --force to replace files with the same names",
             folder.display()
         )));

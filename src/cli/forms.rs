@@ -1,9 +1,9 @@
 //! Other forms of the estimates of a fit: base parameters, terms of a pointing model.
 
-use abbe::identify::IdentifyError;
 use abbe::identify::fit::{Fit, base, tpoint};
 use abbe::identify::problem::Problem;
 use abbe::identify::results::FitResult;
+use abbe::model::Diagnostic;
 use clap::{Args, ValueEnum};
 
 /// The forms that are printed besides the parameters.
@@ -33,7 +33,7 @@ impl FormArguments {
     ///
     /// # Errors
     /// If the readings have no such form, or the model cannot be evaluated.
-    pub fn add(&self, problem: &Problem, fit: &Fit, result: &mut FitResult) -> Result<(), IdentifyError> {
+    pub fn add(&self, problem: &Problem, fit: &Fit, result: &mut FitResult) -> Result<(), Diagnostic> {
         if self.base {
             result.base = Some(base::report(problem, fit)?);
         }

@@ -4,13 +4,14 @@ use std::path::PathBuf;
 
 use abbe::files::import::{Foreign, Hint, session};
 use abbe::files::store::Store;
-use abbe::identify::IdentifyError;
+use abbe::identify::error::CONTRADICTED;
 use abbe::import::{ImportOptions, Target, import, key_of_new_session};
+use abbe::model::Diagnostic;
 use abbe::model::instrument;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 
-use super::failure::Failure;
+use super::failure::command_line;
 use super::message::{Kind, tell};
 use super::results::{OutputArguments, Read};
 use super::{Global, folder, output};
@@ -76,9 +77,9 @@ pub struct ImportArguments {
 }
 
 /// Runs `abbe import`.
-pub fn run(arguments: &ImportArguments, _: Global) -> Result<(), Failure> {
+pub fn run(arguments: &ImportArguments, _: Global) -> Result<(), Diagnostic> {
     let outputs = arguments.output.prepared(&[])?;
-    let of_words = |(message, help): (String, String)| Failure::CommandLine(format!("{message}; {help}"));
+    let of_words = |(message, help): (String, String)| command_line(format!("{message}; {help}"));
     let options = ImportOptions {
         kind: arguments.kind.as_deref().map(str::parse).transpose()?,
         set: session::keys(&arguments.set).map_err(of_words)?,
@@ -93,7 +94,7 @@ pub fn run(arguments: &ImportArguments, _: Global) -> Result<(), Failure> {
     let (target, into) = match (&arguments.machine, &arguments.session, &arguments.out) {
         (Some(machine), None, Some(out)) => (Target::Machine(machine), out.as_path()),
         (None, Some(session), _) => (Target::Session(session), output::folder_of(session)),
-        _ => return Err(Failure::CommandLine("state --machine with --out, or --session".into())),
+        _ => return Err(command_line("state --machine with --out, or --session")),
     };
     let imported = import(&files, target, &options).map_err(refused)?;
     match target {
@@ -106,14 +107,14 @@ pub fn run(arguments: &ImportArguments, _: Global) -> Result<(), Failure> {
 }
 
 /// What the command can do about readings that contradict the machine, or about keys that its session lacks.
-fn refused(error: IdentifyError) -> Failure {
-    let note = if let IdentifyError::Contradicted { .. } = error {
+fn refused(error: Diagnostic) -> Diagnostic {
+    let note = if error.code == CONTRADICTED {
         "--allow-implausible writes the session all the same".to_string()
     } else if let Some(key) = key_of_new_session(&error) {
         format!("--set states a key of the new tests, as in --set {key}")
     } else {
-        return error.into();
+        return error;
     };
     tell(Kind::Note, &format!("nothing is written; {note}"));
-    error.into()
+    error
 }

@@ -6,10 +6,10 @@ use std::path::PathBuf;
 
 use abbe::apply::volumetric::{self, MachineWithErrors, functions};
 use abbe::files::{self, Source};
+use abbe::model::Diagnostic;
 use abbe::model::chain::Machine;
 use clap::Args;
 
-use super::failure::Failure;
 use super::output::{self, Outputs};
 use super::results::{OutputArguments, Read};
 use super::values;
@@ -51,9 +51,9 @@ pub fn run(
     machine: &Machine,
     arguments: &MapArguments,
     outputs: &Outputs,
-) -> Result<(), Failure> {
+) -> Result<(), Diagnostic> {
     let (Some(path), Some(file)) = (&arguments.map, &arguments.functions) else {
-        return Err(Failure::Other("--map and --functions go together".into()));
+        return Err(Diagnostic::other("--map and --functions go together"));
     };
     let source = files::text(file, "the file of error functions")?;
     let functions = functions::of_source(&source, machine)?;

@@ -2,11 +2,12 @@
 
 use abbe::apply::geometric;
 use abbe::identify::{fit, self_calibration};
+use abbe::model::Diagnostic;
 use abbe::model::session::Session;
 use clap::ValueEnum;
 
 use super::CommonArguments;
-use super::failure::Failure;
+use super::failure::command_line;
 use super::monte_carlo::DrawArguments;
 use super::output::Outputs;
 use super::results::Read;
@@ -46,7 +47,7 @@ impl Method {
         draws: &DrawArguments,
         (common, outputs): (&CommonArguments, &Outputs),
         read: &Read<'_>,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), Diagnostic> {
         if let Some(method) = self.geometric() {
             draws.refuse()?;
             let result = geometric::compare(session, method, common.seed)?;
@@ -60,11 +61,11 @@ impl Method {
 }
 
 /// Refuses options that take the result of the full fit, each with whether it is given.
-pub fn refuse<const N: usize>(options: [(&str, bool); N]) -> Result<(), Failure> {
+pub fn refuse<const N: usize>(options: [(&str, bool); N]) -> Result<(), Diagnostic> {
     match options.into_iter().find(|(_, is_given)| *is_given) {
         None => Ok(()),
         Some((name, _)) => {
-            Err(Failure::CommandLine(format!("`{name}` takes the result of the full fit: leave out `--method`")))
+            Err(command_line(format!("`{name}` takes the result of the full fit: leave out `--method`")))
         }
     }
 }

@@ -50,13 +50,14 @@ use std::process::ExitCode;
 use abbe::analysis::{self, Analysis};
 use abbe::files::{self, ReadOptions, SourceMap};
 use abbe::identify::plausibility::{self, Plausibility};
+use abbe::model::Diagnostic;
 use abbe::model::session::Session;
 use abbe::model::session::motion::Motion;
 use clap::{Args, Parser, Subcommand};
 use serde_json::Map;
 
 use crate::report::commands::Commands;
-use failure::Failure;
+use failure::command_line;
 use output::Outputs;
 use results::OutputArguments;
 
@@ -90,7 +91,7 @@ macro_rules! commands {
         }
 
         /// Runs a command.
-        fn execute(command: Command, global: Global) -> Result<(), Failure> {
+        fn execute(command: Command, global: Global) -> Result<(), Diagnostic> {
             match command { $(Command::$name(arguments) => $module::run(&arguments, global),)* }
         }
     };
@@ -163,7 +164,7 @@ pub struct PlausibilityArguments {
 
 impl PlausibilityArguments {
     /// Refuses estimates that mean nothing and have a cause.
-    fn check(self, found: &Plausibility) -> Result<(), Failure> {
+    fn check(self, found: &Plausibility) -> Result<(), Diagnostic> {
         if self.allow_implausible { Ok(()) } else { Ok(plausibility::accepted(found)?) }
     }
 }
@@ -175,7 +176,7 @@ impl SessionArguments {
     }
 
     /// Reads the planned motions of a session; its data only if a test states its positions there alone, and `needs` them.
-    fn read_planned(&self, needs: impl Fn(&Session) -> bool) -> Result<(Session, SourceMap), Failure> {
+    fn read_planned(&self, needs: impl Fn(&Session) -> bool) -> Result<(Session, SourceMap), Diagnostic> {
         let source = files::text(&self.session, "the session file")?;
         let (session, sources) = files::session_of(&source, &ReadOptions { read_data: false, ..self.options() })?;
         if needs(&session) && session.tests.iter().any(|test| matches!(test.motion, None | Some(Motion::List))) {
@@ -185,12 +186,12 @@ impl SessionArguments {
     }
 
     /// How command lines name the session after an analysis with these options, on which its result depends.
-    fn commands<A: Analysis>(&self, seed: u64, options: &A::Options) -> Result<Commands, Failure> {
+    fn commands<A: Analysis>(&self, seed: u64, options: &A::Options) -> Result<Commands, Diagnostic> {
         let mut repeated = Map::new();
         if seed != 1 {
             repeated.insert("seed".to_string(), seed.into());
         }
-        repeated.extend(analysis::stated(options).map_err(|cause| Failure::Other(cause.to_string()))?);
+        repeated.extend(analysis::stated(options).map_err(|cause| Diagnostic::other(cause.to_string()))?);
         // The next search may take its time.
         repeated.shift_remove("time_limit");
         Ok(self.data.commands(&self.session).made_by(A::NAME, &repeated))
@@ -236,28 +237,28 @@ pub fn run() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(_) if interrupt::is_ended() => ExitCode::from(interrupt::status()),
         Err(failure) => {
-            failure.show();
-            ExitCode::from(failure.status())
+            failure::show(&failure);
+            ExitCode::from(failure::status(&failure))
         }
     }
 }
 
 /// Makes the threads of the process, if their number is stated.
-fn with_threads(threads: Option<u32>) -> Result<(), Failure> {
+fn with_threads(threads: Option<u32>) -> Result<(), Diagnostic> {
     let Some(threads) = threads else { return Ok(()) };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build_global();
-    pool.map_err(|cause| Failure::Other(format!("{threads} threads cannot be started: {cause}; state fewer")))
+    pool.map_err(|cause| Diagnostic::other(format!("{threads} threads cannot be started: {cause}; state fewer")))
 }
 
 /// Runs another command line as a part of a command.
-fn again(arguments: &[&str], quiet: bool) -> Result<(), Failure> {
+fn again(arguments: &[&str], quiet: bool) -> Result<(), Diagnostic> {
     let words = std::iter::once("abbe").chain(arguments.iter().copied());
-    let parsed = Arguments::try_parse_from(words).map_err(|wrong| Failure::CommandLine(wrong.to_string()))?;
+    let parsed = Arguments::try_parse_from(words).map_err(|wrong| command_line(wrong.to_string()))?;
     execute(parsed.command, Global { quiet, threads: parsed.threads })
 }
 
 /// Reads the session, with its sources. No output may replace one of its files.
-fn read_session(arguments: &SessionArguments, outputs: &Outputs) -> Result<(Session, SourceMap), Failure> {
+fn read_session(arguments: &SessionArguments, outputs: &Outputs) -> Result<(Session, SourceMap), Diagnostic> {
     let (session, sources) = files::session_with_sources(&arguments.session, &arguments.options())?;
     outputs.refuse_overwrite_of_sources(&sources)?;
     Ok((session, sources))

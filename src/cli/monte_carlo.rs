@@ -1,9 +1,10 @@
 //! `--monte-carlo`: propagation of distributions.
 
 use abbe::identify::self_calibration::MonteCarlo;
+use abbe::model::Diagnostic;
 use clap::Args;
 
-use super::failure::Failure;
+use super::failure::command_line;
 
 /// Monte Carlo propagation of a self-calibration or of the full fit.
 #[derive(Args)]
@@ -28,31 +29,30 @@ const MAX_RUNS: u64 = 1_000_000_000;
 
 impl DrawArguments {
     /// Refuses Monte Carlo with another method.
-    pub fn refuse(&self) -> Result<(), Failure> {
+    pub fn refuse(&self) -> Result<(), Diagnostic> {
         match self.monte_carlo {
             None => Ok(()),
-            Some(_) => Err(Failure::CommandLine(
-                "`--monte-carlo` works with the full fit and with `--method self-calibration`: leave out `--method` or `--monte-carlo`"
-                    .into(),
+            Some(_) => Err(command_line(
+                "`--monte-carlo` works with the full fit and with `--method self-calibration`: leave out `--method` or `--monte-carlo`",
             )),
         }
     }
 
     /// The requested Monte Carlo propagation.
-    pub fn draws(&self, seed: u64) -> Result<Option<MonteCarlo>, Failure> {
+    pub fn draws(&self, seed: u64) -> Result<Option<MonteCarlo>, Diagnostic> {
         let Some(runs) = self.monte_carlo else {
             return Ok(None);
         };
         if runs > MAX_RUNS {
-            return Err(Failure::Other(format!("`--monte-carlo {runs}`: {MAX_RUNS} runs are the most")));
+            return Err(Diagnostic::other(format!("`--monte-carlo {runs}`: {MAX_RUNS} runs are the most")));
         }
         if runs < MIN_RUNS {
-            return Err(Failure::Other(format!(
+            return Err(Diagnostic::other(format!(
                 "`--monte-carlo {runs}`: at least {MIN_RUNS} runs are needed for the coverage intervals"
             )));
         }
         if !(self.coverage > 0.5 && self.coverage < 0.9999) {
-            return Err(Failure::Other(format!(
+            return Err(Diagnostic::other(format!(
                 "`--coverage {}`: a probability between 0.5 and 0.9999 is expected",
                 self.coverage
             )));

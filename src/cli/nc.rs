@@ -5,11 +5,11 @@ pub mod motion;
 use std::path::PathBuf;
 
 use abbe::codegen::nc::{self, NcFiles};
+use abbe::model::Diagnostic;
 use abbe::plan::collision;
 use clap::Args;
 
 use self::motion::MotionArguments;
-use super::failure::Failure;
 use super::message::print_warnings;
 use super::{Global, SessionArguments, folder, output};
 use crate::printers::terminal;
@@ -40,7 +40,7 @@ pub struct NcArguments {
 }
 
 /// Runs `abbe nc`.
-pub fn run(arguments: &NcArguments, Global { quiet, .. }: Global) -> Result<(), Failure> {
+pub fn run(arguments: &NcArguments, Global { quiet, .. }: Global) -> Result<(), Diagnostic> {
     let control = arguments.control;
     let options = arguments.motion.options();
     let (session, sources) = arguments.session.read_planned(|session| nc::has_letters(&session.machine))?;

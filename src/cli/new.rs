@@ -8,13 +8,13 @@ mod templates;
 use std::path::PathBuf;
 
 use abbe::files::template;
-use abbe::model::ModelError;
+use abbe::model::Diagnostic;
+use abbe::model::chain::UNKNOWN_AXIS_KIND;
 use clap::Args;
 
 use self::sizes::SizeArguments;
 use self::templates::TEMPLATES;
 use super::Global;
-use super::failure::Failure;
 use super::folder::{self, NewFile};
 
 /// Examples of `abbe new`.
@@ -57,7 +57,7 @@ pub struct NewArguments {
 }
 
 /// Runs `abbe new`.
-pub fn run(arguments: &NewArguments, Global { quiet, .. }: Global) -> Result<(), Failure> {
+pub fn run(arguments: &NewArguments, Global { quiet, .. }: Global) -> Result<(), Diagnostic> {
     let (Some(folder), false) = (&arguments.out, arguments.list) else {
         list();
         return Ok(());
@@ -100,20 +100,21 @@ const PLAN_HEAD: &str = "# A plan. `abbe plan plan.toml` analyses which errors t
     # `abbe simulate plan.toml --out run1 --error …` simulates readings. A measured test has a line `data = \"….csv\"`.\n\n";
 
 /// The files of a structural code.
-fn of_code(code: &str, sizes: &SizeArguments) -> Result<Vec<NewFile>, Failure> {
-    let [machine, plan] = template::of_code(code, sizes.stated()).map_err(|fault| match fault {
-        ModelError::UnknownAxisKind { .. } => Failure::Other(format!(
-            "{fault}; `abbe new DIR --template ur10` shows a machine whose axes state their kind and direction"
-        )),
-        fault => fault.into(),
+fn of_code(code: &str, sizes: &SizeArguments) -> Result<Vec<NewFile>, Diagnostic> {
+    let [machine, plan] = template::of_code(code, sizes.stated()).map_err(|mut error| {
+        if error.code == UNKNOWN_AXIS_KIND {
+            error.message +=
+                "; `abbe new DIR --template ur10` shows a machine whose axes state their kind and direction";
+        }
+        error
     })?;
     Ok(vec![("machine.toml".into(), machine), ("plan.toml".into(), format!("{PLAN_HEAD}{plan}"))])
 }
 
 /// The files of a template.
-fn copied(name: &str) -> Result<Vec<NewFile>, Failure> {
+fn copied(name: &str) -> Result<Vec<NewFile>, Diagnostic> {
     let Some(template) = TEMPLATES.iter().find(|template| template.name == name) else {
-        return Err(Failure::Other(format!("no template `{name}`; the templates are {}", names())));
+        return Err(Diagnostic::other(format!("no template `{name}`; the templates are {}", names())));
     };
     let files = template.files.iter();
     Ok(files.map(|(name, text)| (name.to_string(), text.to_string())).collect())

@@ -4,14 +4,13 @@ use std::path::Path;
 
 use abbe::files::SourceMap;
 use abbe::identify::results::TraceResult;
-use abbe::model::ModelError;
+use abbe::model::Diagnostic;
 use abbe::model::chain::Machine;
 use abbe::model::document::edit::SessionText;
 use abbe::model::document::print::Block;
 use abbe::model::document::test::Test;
 use abbe::trace::TraceOutcome;
 
-use super::failure::Failure;
 use super::message::{Kind, tell};
 use super::{SessionArguments, output};
 
@@ -21,8 +20,8 @@ pub fn write(
     path: &Path,
     sources: &SourceMap,
     arguments: &SessionArguments,
-    edit: impl FnOnce(&mut SessionText) -> Result<(), ModelError>,
-) -> Result<(), Failure> {
+    edit: impl FnOnce(&mut SessionText) -> Result<(), Diagnostic>,
+) -> Result<(), Diagnostic> {
     let data = arguments.data.data.as_deref();
     let mut text = sources.text.clone();
     text.relocate(output::folder_of(path), data)?;
@@ -45,7 +44,7 @@ pub fn add_trace(
     trace: &TraceOutcome,
     machine: &Machine,
     with_tests: bool,
-) -> Result<(), ModelError> {
+) -> Result<(), Diagnostic> {
     text.add_effects(&trace.effects, machine)?;
     if with_tests {
         proposals(&trace.result).into_iter().try_for_each(|block| text.add_block(block))?;

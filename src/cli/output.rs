@@ -5,9 +5,10 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use abbe::files::SourceMap;
+use abbe::model::Diagnostic;
 use abbe::temporary::{self, TemporaryFile};
 
-use super::failure::Failure;
+use super::failure::{command_line, unwritable};
 use super::message::{Kind, tell};
 use crate::printers::{csv, terminal};
 use crate::report::table::Table;
@@ -17,8 +18,8 @@ use crate::report::table::Table;
 ///
 /// Pipes and devices (a terminal, `/dev/stdout`) are written in place. `-` is
 /// standard output.
-pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Failure> {
-    let fault = |source| Failure::Write { path: path.display().to_string(), source };
+pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Diagnostic> {
+    let fault = |source| unwritable(path, source);
     if is_standard_output(path) {
         write_out(contents);
         return Ok(());
@@ -29,9 +30,9 @@ pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Failure> {
 /// As [`write_whole`], with contents that are not in memory together.
 pub fn write_streaming(
     path: &Path,
-    contents: impl FnOnce(&mut dyn Write) -> Result<(), Failure>,
-) -> Result<(), Failure> {
-    let fault = |source| Failure::Write { path: path.display().to_string(), source };
+    contents: impl FnOnce(&mut dyn Write) -> Result<(), Diagnostic>,
+) -> Result<(), Diagnostic> {
+    let fault = |source| unwritable(path, source);
     check(path)?;
     if is_standard_output(path) {
         return contents(&mut StandardOutput);
@@ -76,8 +77,8 @@ pub fn folder_of(path: &Path) -> &Path {
 }
 
 /// An error where a file cannot come to lie: said before the work, not after it.
-pub fn check(path: &Path) -> Result<(), Failure> {
-    let refused = |why: String| Err(Failure::Other(format!("{}: cannot be written: {why}", path.display())));
+pub fn check(path: &Path) -> Result<(), Diagnostic> {
+    let refused = |why: String| Err(Diagnostic::other(format!("{}: cannot be written: {why}", path.display())));
     if is_standard_output(path) {
         return Ok(());
     }
@@ -95,10 +96,10 @@ pub fn check(path: &Path) -> Result<(), Failure> {
 }
 
 /// An error where the name of a page promises another format than HTML: said before the work.
-pub fn check_page(path: &Path) -> Result<(), Failure> {
+pub fn check_page(path: &Path) -> Result<(), Diagnostic> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     match extension.as_deref() {
-        Some(other) if !matches!(other, "html" | "htm") && !is_stream(path) => Err(Failure::Other(format!(
+        Some(other) if !matches!(other, "html" | "htm") && !is_stream(path) => Err(Diagnostic::other(format!(
             "{}: the page is HTML; name a file that ends in `.html`{}",
             path.display(),
             if other == "pdf" { ", which a browser prints as PDF" } else { "" }
@@ -116,17 +117,17 @@ pub struct Outputs {
 impl Outputs {
     /// # Errors
     /// If one of them cannot be written where it is asked for, two are one, or two go to standard output.
-    pub fn new<'p>(files: impl IntoIterator<Item = &'p PathBuf>) -> Result<Outputs, Failure> {
+    pub fn new<'p>(files: impl IntoIterator<Item = &'p PathBuf>) -> Result<Outputs, Diagnostic> {
         let mut outputs: Vec<PathBuf> = Vec::new();
         for file in files {
             check(file)?;
             if is_standard_output(file) && outputs.iter().any(|other| is_standard_output(other)) {
-                return Err(Failure::CommandLine(
-                    "`-` is given for two outputs, and standard output can take one; name a file for the other".into(),
+                return Err(command_line(
+                    "`-` is given for two outputs, and standard output can take one; name a file for the other",
                 ));
             }
             if !is_stream(file) && outputs.iter().any(|other| is_same(other, file)) {
-                return Err(Failure::Other(format!(
+                return Err(Diagnostic::other(format!(
                     "{}: two results would be written there; name another file for one of them",
                     file.display()
                 )));
@@ -156,16 +157,16 @@ impl Outputs {
 
     /// # Errors
     /// If one of them would replace the session, its machine or its data.
-    pub fn refuse_overwrite_of_sources(&self, sources: &SourceMap) -> Result<(), Failure> {
+    pub fn refuse_overwrite_of_sources(&self, sources: &SourceMap) -> Result<(), Diagnostic> {
         self.refuse_overwrite(sources.files.iter().map(|stamp| stamp.file.as_path()))
     }
 
     /// # Errors
     /// If one of them would replace a file that is read.
-    pub fn refuse_overwrite<'r>(&self, read: impl IntoIterator<Item = &'r Path>) -> Result<(), Failure> {
+    pub fn refuse_overwrite<'r>(&self, read: impl IntoIterator<Item = &'r Path>) -> Result<(), Diagnostic> {
         for file in read {
             if let Some(output) = self.files.iter().find(|output| !is_stream(output) && is_same(output, file)) {
-                return Err(Failure::Other(format!(
+                return Err(Diagnostic::other(format!(
                     "{}: cannot be written: it is one of the files that are read; name another",
                     output.display()
                 )));
@@ -233,6 +234,6 @@ impl Write for StandardOutput {
 }
 
 /// The table as CSV.
-pub fn csv(table: &Table) -> Result<Vec<u8>, Failure> {
-    csv::text(table).map_err(|error| Failure::Other(format!("the table cannot be written as CSV: {error}")))
+pub fn csv(table: &Table) -> Result<Vec<u8>, Diagnostic> {
+    csv::text(table).map_err(|error| Diagnostic::other(format!("the table cannot be written as CSV: {error}")))
 }

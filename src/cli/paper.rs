@@ -6,10 +6,10 @@ mod readme;
 use std::path::PathBuf;
 
 use abbe::files;
+use abbe::model::Diagnostic;
 use abbe::model::words::counted;
 use clap::Args;
 
-use super::failure::Failure;
 use super::message::print_warnings;
 use super::values::{self, Words};
 use super::{DataArguments, Global, folder, output};
@@ -64,13 +64,13 @@ pub struct PaperArguments {
 }
 
 /// Runs `abbe paper`.
-pub fn run(arguments: &PaperArguments, Global { quiet, .. }: Global) -> Result<(), Failure> {
+pub fn run(arguments: &PaperArguments, Global { quiet, .. }: Global) -> Result<(), Diagnostic> {
     folder::check(&arguments.out, arguments.folder.force)?;
     let mut studies = Vec::new();
     let mut origins = Vec::new();
     for (place, path) in arguments.sessions.iter().enumerate() {
         if arguments.sessions[..place].iter().any(|earlier| output::is_same(earlier, path)) {
-            return Err(Failure::Other(format!("{} is named twice; name each session once", path.display())));
+            return Err(Diagnostic::other(format!("{} is named twice; name each session once", path.display())));
         }
         let (session, sources) = files::session_with_sources(path, &arguments.data.options())?;
         let study = parts::study(arguments, parts::label(&arguments.sessions, path), &session)?;
@@ -89,7 +89,7 @@ pub fn run(arguments: &PaperArguments, Global { quiet, .. }: Global) -> Result<(
         env!("CARGO_PKG_VERSION"),
         counted(studies.len(), "session"),
     );
-    let mut files = paper::files(&title, &summary, &sections, layout).map_err(Failure::Other)?;
+    let mut files = paper::files(&title, &summary, &sections, layout).map_err(Diagnostic::other)?;
     files.push(("README.md".into(), readme::readme(arguments, &origins, &sections)?.into_bytes()));
     folder::write(&arguments.out, &files, arguments.folder.force, |_| Ok(()))?;
     if !quiet {

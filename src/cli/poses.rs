@@ -5,11 +5,11 @@ mod options;
 use std::path::PathBuf;
 
 use abbe::files::{self, ReadOptions};
+use abbe::model::Diagnostic;
 use abbe::plan::design::Goal;
 use abbe::plan::poses::without_place;
 use clap::Args;
 
-use super::failure::Failure;
 use super::results::Read;
 use super::values::{self, Words};
 use super::{CommonArguments, Global, SessionArguments};
@@ -83,7 +83,7 @@ pub struct PoseArguments {
 }
 
 /// Runs `abbe poses`, without the data of the session unless only they tell where a socket is.
-pub fn run(arguments: &PoseArguments, _: Global) -> Result<(), Failure> {
+pub fn run(arguments: &PoseArguments, _: Global) -> Result<(), Diagnostic> {
     let common = &arguments.common;
     let outputs = common.output.prepared(&[arguments.out.as_ref()])?;
     let reading = ReadOptions { read_data: false, ..arguments.session.options() };
@@ -92,7 +92,7 @@ pub fn run(arguments: &PoseArguments, _: Global) -> Result<(), Failure> {
     if let Some(test) = without_place(&session, &arguments.tests(&session)?).first() {
         let with_data = files::session_of(&source, &arguments.session.options());
         (session, sources) = with_data.map_err(|error| {
-            Failure::Other(format!(
+            Diagnostic::other(format!(
                 "test \"{}\" states no `socket_mm`, and its data do not tell where its socket is: {error}",
                 test.name
             ))

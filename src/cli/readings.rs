@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
+use abbe::model::Diagnostic;
 use clap::Args;
 
-use super::failure::Failure;
 use super::output;
 use crate::report::readings;
 
@@ -29,7 +29,7 @@ pub struct ReadingArguments {
 
 impl ReadingArguments {
     /// Writes the tables that are asked for.
-    pub fn write(&self, problem: &Problem, fit: &Fit) -> Result<(), Failure> {
+    pub fn write(&self, problem: &Problem, fit: &Fit) -> Result<(), Diagnostic> {
         if let Some(path) = &self.views {
             output::write_whole(path, &output::csv(&readings::by_direction(problem, fit)?)?)?;
         }

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use abbe::files;
 use abbe::identify::{fit, model_file, repeated};
+use abbe::model::Diagnostic;
 
-use super::failure::Failure;
 use super::output::{self, Outputs};
 use super::results::Read;
 use super::{CommonArguments, DataArguments, PlausibilityArguments};
@@ -19,16 +19,19 @@ pub fn run(
     plausibility: PlausibilityArguments,
     common: &CommonArguments,
     outputs: &Outputs,
-) -> Result<(), Failure> {
+) -> Result<(), Diagnostic> {
     let mut read = Vec::with_capacity(all.len());
     for (place, path) in all.iter().enumerate() {
         if all[..place].iter().any(|earlier| output::is_same(earlier, path)) {
-            return Err(Failure::Other(format!("{} is named twice; name each repeated session once", path.display())));
+            return Err(Diagnostic::other(format!(
+                "{} is named twice; name each repeated session once",
+                path.display()
+            )));
         }
         let source = files::text(path, "the session")?;
         if model_file::is_model(&source.text) {
             let file = path.display();
-            return Err(Failure::Other(format!("{file} is a model; `--repeated` compares the fits of sessions")));
+            return Err(Diagnostic::other(format!("{file} is a model; `--repeated` compares the fits of sessions")));
         }
         let (session, sources) = files::session_of(&source, &data.options())?;
         outputs.refuse_overwrite_of_sources(&sources)?;

@@ -6,11 +6,12 @@ use abbe::analysis::Found;
 use abbe::document::{Call, Document, Origin};
 use abbe::files::SourceMap;
 use abbe::files::stamp::FileStamp;
+use abbe::model::Diagnostic;
 use abbe::model::session::Session;
 use clap::Args;
 use serde::Serialize;
 
-use super::failure::Failure;
+use super::failure::command_line;
 use super::folder;
 use super::json;
 use super::message::print_warnings;
@@ -107,11 +108,10 @@ impl<'r> Read<'r> {
 impl OutputArguments {
     /// The files that are written, `others` of the command among them. What cannot be written is refused before the
     /// work.
-    pub fn prepared(&self, others: &[Option<&PathBuf>]) -> Result<Outputs, Failure> {
+    pub fn prepared(&self, others: &[Option<&PathBuf>]) -> Result<Outputs, Diagnostic> {
         if self.png && !cfg!(feature = "png") {
-            return Err(Failure::CommandLine(
-                "`--png`: this program is built without PNG; build it with `cargo build --release --features png`, or leave out `--png` for SVG"
-                    .into(),
+            return Err(command_line(
+                "`--png`: this program is built without PNG; build it with `cargo build --release --features png`, or leave out `--png` for SVG",
             ));
         }
         if let Some(path) = &self.plots {
@@ -132,7 +132,7 @@ impl OutputArguments {
         report: &Report,
         result: &T,
         read: &Read<'_>,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), Diagnostic> {
         self.write(outputs, report, read, |call, origin| Document::new(call, origin, read.seed, result).text())
     }
 
@@ -143,7 +143,7 @@ impl OutputArguments {
         found: &dyn Found,
         commands: &Commands,
         read: &Read<'_>,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), Diagnostic> {
         let report = found.report(commands, self.report.is_some() || self.plots.is_some())?;
         self.write(outputs, &report, read, |call, origin| found.document(call, origin, read.seed))
     }
@@ -154,7 +154,7 @@ impl OutputArguments {
         report: &Report,
         read: &Read<'_>,
         document: impl FnOnce(Call, Origin) -> Result<String, String>,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), Diagnostic> {
         self.show(outputs, report);
         if let Some(path) = &self.json {
             output::write_whole(path, document(json::command_line(), read.origin())?.as_bytes())?;
@@ -163,7 +163,7 @@ impl OutputArguments {
             output::write_whole(path, &csv::report(report)?)?;
         }
         if let Some(path) = &self.report {
-            let text = page::html(report, &read.provenance()).map_err(Failure::Other)?;
+            let text = page::html(report, &read.provenance()).map_err(Diagnostic::other)?;
             output::write_whole(path, text.as_bytes())?;
         }
         self.plots.as_ref().map_or(Ok(()), |path| write_plots(report, path, self.folder.force))
@@ -178,18 +178,18 @@ impl OutputArguments {
     }
 }
 
-fn write_plots(report: &Report, path: &Path, force: bool) -> Result<(), Failure> {
+fn write_plots(report: &Report, path: &Path, force: bool) -> Result<(), Diagnostic> {
     #[cfg(feature = "png")]
     let fonts = crate::report::figure::png::Fonts::bundled();
     let mut files = Vec::new();
     for figure in report.drawn() {
-        let data = csv::text(&figure.table()).map_err(Failure::Other)?;
+        let data = csv::text(&figure.table()).map_err(Diagnostic::other)?;
         files.push((format!("{}.svg", figure.name), svg::file(figure).into_bytes()));
         files.push((format!("{}.csv", figure.name), data));
         #[cfg(feature = "png")]
         {
             let png = crate::report::figure::png::png(figure, &fonts)
-                .ok_or_else(|| Failure::Other(format!("the plot `{}` cannot be drawn as PNG", figure.name)))?;
+                .ok_or_else(|| Diagnostic::other(format!("the plot `{}` cannot be drawn as PNG", figure.name)))?;
             files.push((format!("{}.png", figure.name), png));
         }
     }

@@ -7,9 +7,10 @@ use abbe::files::SourceMap;
 use abbe::identify::fit::Fit;
 use abbe::identify::model_file::IdentifiedModel;
 use abbe::identify::problem::Problem;
+use abbe::model::Diagnostic;
 use clap::Args;
 
-use super::failure::Failure;
+use super::failure::command_line;
 use super::{json, output};
 
 /// The file of the model.
@@ -25,7 +26,7 @@ pub struct SaveArguments {
 
 impl SaveArguments {
     /// Saves the model of a fit, if it is requested.
-    pub fn run(&self, problem: &Problem, fit: &Fit, sources: &SourceMap, seed: u64) -> Result<(), Failure> {
+    pub fn run(&self, problem: &Problem, fit: &Fit, sources: &SourceMap, seed: u64) -> Result<(), Diagnostic> {
         let Some(path) = &self.save else {
             return Ok(());
         };

@@ -1,10 +1,10 @@
 //! `abbe schema`: what the files hold, as JSON Schema.
 
+use abbe::model::Diagnostic;
 use abbe::schemas::SCHEMAS;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
-use super::failure::Failure;
 use super::{Global, output};
 
 /// Examples of `abbe schema`.
@@ -28,10 +28,10 @@ pub struct SchemaArguments {
 }
 
 /// Runs `abbe schema`.
-pub fn run(arguments: &SchemaArguments, _: Global) -> Result<(), Failure> {
+pub fn run(arguments: &SchemaArguments, _: Global) -> Result<(), Diagnostic> {
     let file = SCHEMAS.iter().find(|file| file.word == arguments.subject);
     let schema = file.map(|file| (file.schema)());
     let text = serde_json::to_string_pretty(&schema);
-    output::whole(&text.map_err(|error| Failure::Other(format!("the schema cannot be written: {error}")))?);
+    output::whole(&text.map_err(|error| Diagnostic::other(format!("the schema cannot be written: {error}")))?);
     Ok(())
 }

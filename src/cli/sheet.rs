@@ -5,11 +5,11 @@ mod order;
 use std::path::PathBuf;
 
 use abbe::codegen::nc::Control;
+use abbe::model::Diagnostic;
 use abbe::model::words::counted;
 use abbe::plan::sheet::{SetUpTimes, sheets};
 use clap::Args;
 
-use super::failure::Failure;
 use super::message::print_warnings;
 use super::nc::motion::{self, MotionArguments};
 use super::{Global, SessionArguments, output, values};
@@ -58,7 +58,7 @@ pub struct SheetArguments {
 }
 
 /// Runs `abbe sheet`.
-pub fn run(arguments: &SheetArguments, Global { quiet, .. }: Global) -> Result<(), Failure> {
+pub fn run(arguments: &SheetArguments, Global { quiet, .. }: Global) -> Result<(), Diagnostic> {
     for (flag, value) in
         [("--setup-min", arguments.setup_min), ("--test-min", arguments.test_min), ("--bar-min", arguments.bar_min)]
     {

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use abbe::files::{self, Changes, with_readings};
 use abbe::identify::quantity::{self, Given};
 use abbe::identify::simulate::{Simulation, SimulationResult, simulate};
+use abbe::model::Diagnostic;
 use abbe::model::unit::ARCSEC_PER_RAD;
 use clap::Args;
 
-use super::failure::Failure;
 use super::results::Read;
 use super::{CommonArguments, Global, SessionArguments, folder, output, read_session, values};
 use crate::report::simulation as present;
@@ -62,7 +62,7 @@ pub struct SimulateArguments {
 }
 
 /// Runs `abbe simulate`.
-pub fn run(arguments: &SimulateArguments, _: Global) -> Result<(), Failure> {
+pub fn run(arguments: &SimulateArguments, _: Global) -> Result<(), Diagnostic> {
     let outputs = arguments.common.output.prepared(&[])?;
     let (session, sources) = read_session(&arguments.session, &outputs)?;
     let mut given = match &arguments.file {
@@ -92,7 +92,7 @@ pub fn run(arguments: &SimulateArguments, _: Global) -> Result<(), Failure> {
     let changes = Changes { noise_um, noise_arcsec, hide_effects };
     let files = with_readings((&session, &sources), &simulated.readings, changes)?;
     if output::is_same(output::folder_of(&sources.file), &arguments.out) {
-        return Err(Failure::Other(format!(
+        return Err(Diagnostic::other(format!(
             "{}: this folder contains the plan itself; write the readings to another folder",
             arguments.out.display()
         )));

@@ -7,12 +7,12 @@ mod progress;
 use std::path::PathBuf;
 
 use abbe::analysis::SearchOptions;
+use abbe::model::Diagnostic;
 use abbe::trace::TraceOutcome;
 use clap::Args;
 
 use clock::seconds;
 
-use super::failure::Failure;
 use super::results::Read;
 use super::save::SaveArguments;
 use super::{CommonArguments, Global, PlausibilityArguments, SessionArguments, next_session, output, read_session};
@@ -63,7 +63,7 @@ pub struct TraceArguments {
 }
 
 /// Runs `abbe trace`.
-pub fn run(arguments: &TraceArguments, _: Global) -> Result<(), Failure> {
+pub fn run(arguments: &TraceArguments, _: Global) -> Result<(), Diagnostic> {
     let common = &arguments.common;
     let force = common.output.folder.force;
     arguments.next.check(force)?;

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use abbe::analysis::{Analysis, Given, Validated, ValidationOptions};
 use abbe::files;
 use abbe::identify::model_file;
+use abbe::model::Diagnostic;
 use clap::Args;
 
-use super::failure::Failure;
 use super::results::Read;
 use super::{CommonArguments, Global, SessionArguments, read_session};
 
@@ -28,7 +28,7 @@ pub struct ValidateArguments {
 }
 
 /// Runs `abbe validate`.
-pub fn run(arguments: &ValidateArguments, _: Global) -> Result<(), Failure> {
+pub fn run(arguments: &ValidateArguments, _: Global) -> Result<(), Diagnostic> {
     let common = &arguments.common;
     let outputs = common.output.prepared(&[])?;
     outputs.refuse_overwrite([arguments.model.as_path()])?;
@@ -36,7 +36,7 @@ pub fn run(arguments: &ValidateArguments, _: Global) -> Result<(), Failure> {
     let model = model_file::of_source(&source)?;
     let (session, sources) = read_session(&arguments.session, &outputs)?;
     let given = [Given::Model(&model), Given::Session(&session)];
-    let found = Validated::run::<Failure>(&given, &arguments.options, common.seed, &|_| true)?;
+    let found = Validated::run(&given, &arguments.options, common.seed, &|_| true)?;
     let commands = arguments.session.commands::<Validated>(1, &ValidationOptions::default())?;
     let mut read = Read::session(&session, &sources, common.seed);
     read.files.extend(&source.stamp);

@@ -1,11 +1,10 @@
 //! Quantities that options state, each with its limits. A number that cannot be one is refused with the option.
 
+use abbe::model::Diagnostic;
 use abbe::model::chain::Machine;
 use abbe::model::session::limits::{LARGEST, MAX_LENGTH_MM, MIN_UM};
 use abbe::model::words::number;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-
-use super::failure::Failure;
 
 /// A quantity: its words and its limits.
 #[derive(Clone, Copy)]
@@ -57,15 +56,15 @@ pub const POSITION: Quantity = within("a position in mm or degrees", "", -MAX_LE
 
 impl Quantity {
     /// The value, if it can be this quantity.
-    pub fn check(&self, option: &str, value: f64) -> Result<f64, Failure> {
+    pub fn check(&self, option: &str, value: f64) -> Result<f64, Diagnostic> {
         self.reason(value).map_or(Ok(value), |expected| {
             let space = if option.ends_with('=') { "" } else { " " };
-            Err(Failure::Other(format!("`{option}{space}{}`: {expected}", number(value))))
+            Err(Diagnostic::other(format!("`{option}{space}{}`: {expected}", number(value))))
         })
     }
 
     /// The values, if each can be this quantity.
-    pub fn all(&self, option: &str, values: &[f64]) -> Result<Vec<f64>, Failure> {
+    pub fn all(&self, option: &str, values: &[f64]) -> Result<Vec<f64>, Diagnostic> {
         values.iter().map(|value| self.check(option, *value)).collect()
     }
 
@@ -100,17 +99,17 @@ pub fn words<T: Clone + Send + Sync>(words: Words<T>) -> impl TypedValueParser<V
 }
 
 /// A positive length in µm, converted to mm.
-pub fn length_um(option: &str, um: f64) -> Result<f64, Failure> {
+pub fn length_um(option: &str, um: f64) -> Result<f64, Diagnostic> {
     Ok(DEVIATION_UM.check(option, um)? * 1e-3)
 }
 
 /// A number of things from 1 to the most.
-pub fn count(option: &str, things: &str, value: usize, most: usize) -> Result<usize, Failure> {
+pub fn count(option: &str, things: &str, value: usize, most: usize) -> Result<usize, Diagnostic> {
     if (1..=most).contains(&value) {
         return Ok(value);
     }
     let of = if things.is_empty() { String::new() } else { format!(" of {things}") };
-    Err(Failure::Other(format!("`{option} {value}`: a number{of} from 1 to {most} is expected")))
+    Err(Diagnostic::other(format!("`{option} {value}`: a number{of} from 1 to {most} is expected")))
 }
 
 /// A number of threads.
@@ -119,35 +118,36 @@ pub fn threads() -> clap::builder::RangedI64ValueParser<u32> {
 }
 
 /// A point that an option states by three coordinates; `usual` if it is not stated.
-pub fn point_mm(option: &str, stated: &[f64], usual: [f64; 3]) -> Result<[f64; 3], Failure> {
+pub fn point_mm(option: &str, stated: &[f64], usual: [f64; 3]) -> Result<[f64; 3], Diagnostic> {
     match *stated {
         [] => Ok(usual),
         [x, y, z] => {
             COORDINATE_MM.all(option, stated)?;
             Ok([x, y, z])
         }
-        _ => Err(Failure::Other(format!("`{option}`: three numbers are expected, as in 0,0,-120"))),
+        _ => Err(Diagnostic::other(format!("`{option}`: three numbers are expected, as in 0,0,-120"))),
     }
 }
 
 /// The positions of axes that options `--at AXIS=POSITION` state, zero for the others, mm or rad.
-pub fn positions(machine: &Machine, stated: &[String]) -> Result<Vec<f64>, Failure> {
+pub fn positions(machine: &Machine, stated: &[String]) -> Result<Vec<f64>, Diagnostic> {
     let mut at = vec![None; machine.axes.len()];
     for text in stated {
-        let fault = || Failure::Other(format!("--at {text}: write an axis and its position in mm or degrees, `A=30`"));
+        let fault =
+            || Diagnostic::other(format!("--at {text}: write an axis and its position in mm or degrees, `A=30`"));
         let (name, number) = text.split_once('=').ok_or_else(fault)?;
         let number: f64 = number.trim().parse().map_err(|_| fault())?;
         POSITION.check(&format!("--at {}=", name.trim()), number)?;
         let Some(axis) = machine.axis_index(name.trim()) else {
             let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
             let axes = names.join(", ");
-            return Err(Failure::Other(format!(
+            return Err(Diagnostic::other(format!(
                 "--at {text}: the machine has no axis `{}`; its axes are {axes}",
                 name.trim()
             )));
         };
         if at[axis].replace(machine.axes[axis].kind.to_internal(number)).is_some() {
-            return Err(Failure::Other(format!("--at {text}: the position of {} is stated twice", name.trim())));
+            return Err(Diagnostic::other(format!("--at {text}: the position of {} is stated twice", name.trim())));
         }
     }
     Ok(at.into_iter().map(Option::unwrap_or_default).collect())

@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use abbe::codegen::{Equation, ToolPoint};
 use abbe::equation::EquationParameters;
 use abbe::files;
+use abbe::model::Diagnostic;
 use abbe::model::pattern;
 use clap::Args;
 
 use super::Global;
 use super::equation::form::FormArguments;
-use super::failure::Failure;
 use super::map::{self, MapArguments};
 
 /// Examples of `abbe volumetric`.
@@ -28,7 +28,7 @@ pub struct VolumetricArguments {
 }
 
 /// Runs `abbe volumetric`.
-pub fn run(arguments: &VolumetricArguments, _: Global) -> Result<(), Failure> {
+pub fn run(arguments: &VolumetricArguments, _: Global) -> Result<(), Diagnostic> {
     let source = files::text(&arguments.machine, "the machine file")?;
     let machine = files::machine_of(&source)?;
     let outputs = arguments.map.output.prepared(&[arguments.form.out.as_ref(), arguments.map.map.as_ref()])?;

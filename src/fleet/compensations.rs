@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use abbe_apply::history::events::{Compensation, KnownChange};
+use abbe_model::Diagnostic;
 
 use abbe_files::Source;
 
-use super::FleetError;
 use super::date;
+use super::unusable;
 
 /// The columns of the file.
 const COLUMNS: [&str; 5] = ["machine_id", "date", "parameter", "change", "unit"];
@@ -17,7 +18,7 @@ const COLUMNS: [&str; 5] = ["machine_id", "date", "parameter", "change", "unit"]
 ///
 /// # Errors
 /// If the file cannot be read; with the line of what cannot be used.
-pub fn read(file: &Path) -> Result<Vec<Compensation>, FleetError> {
+pub fn read(file: &Path) -> Result<Vec<Compensation>, Diagnostic> {
     of_source(&abbe_files::text(file, "the file of compensations")?)
 }
 
@@ -25,7 +26,7 @@ pub fn read(file: &Path) -> Result<Vec<Compensation>, FleetError> {
 ///
 /// # Errors
 /// As [`read`].
-pub fn of_source(source: &Source) -> Result<Vec<Compensation>, FleetError> {
+pub fn of_source(source: &Source) -> Result<Vec<Compensation>, Diagnostic> {
     #[derive(serde::Deserialize)]
     #[serde(deny_unknown_fields)]
     struct Row {
@@ -36,9 +37,7 @@ pub fn of_source(source: &Source) -> Result<Vec<Compensation>, FleetError> {
         unit: String,
     }
     let name = source.file.display();
-    let fault = |line: usize, found: String, expected: &str| {
-        FleetError::unusable(format_args!("{name}:{line}"), found, expected)
-    };
+    let fault = |line: usize, found: String, expected: &str| unusable(format_args!("{name}:{line}"), found, expected);
     let mut contents = source.text.clone();
     // The line of a row is that before the place of the reader behind it.
     if !contents.ends_with('\n') {

@@ -11,11 +11,11 @@ use abbe_identify::results::{Estimate, MeasuredValue, NextStep, Statements};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::FleetError;
 use super::conformity::MachineConformity;
 use super::date;
 use super::record::Record;
 use super::store::{Pointer, Store};
+use super::unusable;
 
 /// The machines of a folder over time, and their faults.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -126,7 +126,7 @@ struct Dated {
 ///
 /// # Errors
 /// If the folder cannot be read, or has no session of the machine.
-pub fn history(store: &Store, machine_id: Option<&str>, options: &HistoryOptions) -> Result<FleetHistory, FleetError> {
+pub fn history(store: &Store, machine_id: Option<&str>, options: &HistoryOptions) -> Result<FleetHistory, Diagnostic> {
     let (records, missing) = store.records()?;
     let mut not_used: Vec<NotUsed> = missing
         .into_iter()
@@ -139,7 +139,10 @@ pub fn history(store: &Store, machine_id: Option<&str>, options: &HistoryOptions
     let all = records.len();
     let known: BTreeSet<String> = records.iter().map(|(_, record)| record.machine_id.clone()).collect();
     if let Some(id) = machine_id.filter(|id| !known.contains(*id)) {
-        return Err(FleetError::UnknownMachine { id: id.to_string(), sessions: all });
+        return Err(Diagnostic::other(format!(
+            "no session of the machine `{id}` among {all}: the identifier is `serial_number` of [about], or the name of the \
+             machine"
+        )));
     }
     let mut machines: BTreeMap<String, Vec<Dated>> = BTreeMap::new();
     for dated in usable(records, &mut not_used) {
@@ -173,14 +176,14 @@ pub fn history(store: &Store, machine_id: Option<&str>, options: &HistoryOptions
 
 /// # Errors
 /// If a compensation states a change in another unit than the parameter has.
-fn check_units(machines: &[MachineSessions], compensations: &[Compensation]) -> Result<(), FleetError> {
+fn check_units(machines: &[MachineSessions], compensations: &[Compensation]) -> Result<(), Diagnostic> {
     for known in compensations {
         let of_machine = machines.iter().filter(|machine| machine.machine_id == known.machine_id);
         for (id, unit, _) in of_machine.flat_map(|machine| &machine.parameters) {
             if let Some(stated) = known.changes.iter().find(|known| known.id == *id && known.unit != *unit) {
                 let (machine, stated_in) = (&known.machine_id, &stated.unit);
                 let found = format!("compensation of {machine}: the change of {id} is stated in `{stated_in}`");
-                return Err(FleetError::unusable(&stated.source, found, format!("state it in {unit}")));
+                return Err(unusable(&stated.source, found, format!("state it in {unit}")));
             }
         }
     }

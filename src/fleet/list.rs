@@ -3,7 +3,9 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::FleetError;
+use abbe_model::Diagnostic;
+
+use super::{unreadable, unusable};
 
 /// The name of a session file in a folder that is searched.
 const SESSION_FILE: &str = "session.toml";
@@ -20,7 +22,7 @@ const MAX_PATHS: usize = 1_000_000;
 ///
 /// # Errors
 /// If a folder holds no `session.toml`.
-pub fn sessions(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FleetError> {
+pub fn sessions(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Diagnostic> {
     let mut found = Vec::new();
     for path in paths {
         if path.is_dir() {
@@ -28,7 +30,7 @@ pub fn sessions(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FleetError> {
             below(path, &mut found);
             if found.len() == before {
                 let found = format!("no {SESSION_FILE} lies in this folder or below");
-                return Err(FleetError::unusable(path.display(), found, "name session files"));
+                return Err(unusable(path.display(), found, "name session files"));
             }
         } else {
             found.push(path.clone());
@@ -48,21 +50,17 @@ pub fn chosen(
     typed: &[PathBuf],
     list: Option<&Path>,
     part: Option<(usize, usize)>,
-) -> Result<(Vec<PathBuf>, Vec<PathBuf>), FleetError> {
+) -> Result<(Vec<PathBuf>, Vec<PathBuf>), Diagnostic> {
     // A file of a list may be gone since the list was made: it is a result with its error. A path that is typed is a
     // mistake.
     if let Some(path) = typed.iter().find(|path| matches!(path.try_exists(), Ok(false))) {
-        return Err(FleetError::unusable(
-            path.display(),
-            "neither a session file nor a folder is there",
-            "correct the path",
-        ));
+        return Err(unusable(path.display(), "neither a session file nor a folder is there", "correct the path"));
     }
     let mut paths = typed.to_vec();
     paths.extend(list.map_or(Ok(Vec::new()), listed)?);
     let files = sessions(&paths)?;
     if files.is_empty() && part.is_none() {
-        return Err(FleetError::NoSession);
+        return Err(Diagnostic::other("no session is named; name session files or folders"));
     }
     let (first, every) = part.map_or((0, 1), |(k, n)| (k - 1, n));
     Ok((paths, files.into_iter().skip(first).step_by(every).collect()))
@@ -73,8 +71,8 @@ pub fn chosen(
 ///
 /// # Errors
 /// If the file cannot be read or is no UTF-8.
-pub fn listed(file: &Path) -> Result<Vec<PathBuf>, FleetError> {
-    let fault = |source| FleetError::Read { path: file.display().to_string(), source };
+pub fn listed(file: &Path) -> Result<Vec<PathBuf>, Diagnostic> {
+    let fault = |source| unreadable(file, source);
     let mut text = String::new();
     let opened: Box<dyn Read> = match file.as_os_str() == "-" {
         true => Box::new(std::io::stdin()),
@@ -85,7 +83,7 @@ pub fn listed(file: &Path) -> Result<Vec<PathBuf>, FleetError> {
     let count = lines().count();
     if text.len() as u64 > MAX_BYTES || count > MAX_PATHS {
         let found = format!("a list has at most {MAX_PATHS} paths and {MAX_BYTES} bytes");
-        return Err(FleetError::unusable(file.display(), found, "name folders, or split the list"));
+        return Err(unusable(file.display(), found, "name folders, or split the list"));
     }
     Ok(lines().map(PathBuf::from).collect())
 }

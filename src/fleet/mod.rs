@@ -24,67 +24,32 @@ pub mod run;
 pub mod store;
 pub mod study;
 pub mod unit;
+use std::fmt::Display;
+use std::path::Path;
+
+use abbe_identify::error::INTERRUPTED;
+use abbe_model::Diagnostic;
+use abbe_model::diagnostic::Location;
 
 /// Version of the program and the first digits of the SHA-256 of the sources that determine results, such as
 /// `0.1.0+3fa2b1c9d4e5`. A change of these sources gives other keys.
 pub const BUILD: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("ABBE_SOURCES"));
 
-/// Why the results of a fleet cannot be read or written. A session that cannot be analysed is a record, not an error.
-#[derive(Debug, thiserror::Error)]
-pub enum FleetError {
-    /// A file or folder that cannot be read.
-    #[error("{path}: cannot be read: {source}")]
-    Read {
-        /// The file.
-        path: String,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// A file or folder that cannot be written. Records that were written before remain.
-    #[error("{path}: cannot be written: {source}; free space and run again: finished results are kept")]
-    Write {
-        /// The file.
-        path: String,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The caller ended the work before the session was done.
-    #[error("interrupted before the session was done")]
-    Interrupted,
-    /// A document that cannot be used.
-    #[error(transparent)]
-    Model(#[from] abbe_model::ModelError),
-    /// A folder, a file, or a line of a file that is not what is expected.
-    #[error("{place}: {found}; {expected}")]
-    Unusable {
-        /// The folder, or the file, with the line.
-        place: String,
-        /// What was found.
-        found: String,
-        /// What is expected, or what to do.
-        expected: String,
-    },
-    /// No session is named.
-    #[error("no session is named; name session files or folders")]
-    NoSession,
-    /// A machine without sessions.
-    #[error(
-        "no session of the machine `{id}` among {sessions}: the identifier is `serial_number` of [about], or the name of the \
-         machine"
-    )]
-    UnknownMachine {
-        /// The identifier as given.
-        id: String,
-        /// The number of sessions.
-        sessions: usize,
-    },
-    /// The threads cannot be started.
-    #[error("the threads cannot be started: {0}")]
-    Threads(#[from] rayon::ThreadPoolBuildError),
+/// The caller ended the work before the session was done.
+fn interrupted() -> Diagnostic {
+    Diagnostic { code: INTERRUPTED, ..Diagnostic::other("interrupted before the session was done") }
 }
 
-impl FleetError {
-    fn unusable(place: impl std::fmt::Display, found: impl Into<String>, expected: impl Into<String>) -> FleetError {
-        FleetError::Unusable { place: place.to_string(), found: found.into(), expected: expected.into() }
-    }
+fn unreadable(path: &Path, cause: std::io::Error) -> Diagnostic {
+    Diagnostic::other(format!("cannot be read: {cause}")).at(Location::file(path))
+}
+
+fn unwritable(path: &Path, cause: std::io::Error) -> Diagnostic {
+    let remedy = "free space and run again: finished results are kept";
+    Diagnostic::other(format!("cannot be written: {cause}; {remedy}")).at(Location::file(path))
+}
+
+/// A folder, a file, or a line of a file that is not what is expected.
+fn unusable(place: impl Display, found: impl Display, expected: impl Display) -> Diagnostic {
+    Diagnostic::other(format!("{place}: {found}; {expected}"))
 }

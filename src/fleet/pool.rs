@@ -2,9 +2,11 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use abbe_identify::error::INTERRUPTED;
+use abbe_model::Diagnostic;
 use rayon::prelude::*;
 
-use super::FleetError;
+use super::interrupted;
 use super::store::IfClaimed;
 
 /// What was done, in the order of the units, and why the work ended early.
@@ -12,7 +14,7 @@ pub struct Pooled<T> {
     /// Done.
     pub done: Vec<T>,
     /// Why it ended early.
-    pub ended: Option<FleetError>,
+    pub ended: Option<Diagnostic>,
 }
 
 /// What a unit asks before each of its steps: whether the work goes on.
@@ -24,14 +26,14 @@ pub fn all<U: Sync, T: Send>(
     units: &[U],
     threads: usize,
     should_continue: ShouldContinue<'_>,
-    unit: impl Fn(&U, IfClaimed, ShouldContinue<'_>) -> Result<Option<T>, FleetError> + Sync,
+    unit: impl Fn(&U, IfClaimed, ShouldContinue<'_>) -> Result<Option<T>, Diagnostic> + Sync,
     did: &(dyn Fn() + Sync),
 ) -> Pooled<T> {
     let stopped = AtomicBool::new(false);
     let should_continue = || should_continue() && !stopped.load(Ordering::Relaxed);
     let one = |own: &U, if_claimed: IfClaimed| {
         if !should_continue() {
-            return Err(FleetError::Interrupted);
+            return Err(interrupted());
         }
         let outcome = unit(own, if_claimed, &should_continue);
         match outcome {
@@ -43,9 +45,14 @@ pub fn all<U: Sync, T: Send>(
     };
     let pool = match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool,
-        Err(cause) => return Pooled { done: Vec::new(), ended: Some(cause.into()) },
+        Err(cause) => {
+            return Pooled {
+                done: Vec::new(),
+                ended: Some(Diagnostic::other(format!("the threads cannot be started: {cause}"))),
+            };
+        }
     };
-    let mut outcomes: Vec<Result<Option<T>, FleetError>> =
+    let mut outcomes: Vec<Result<Option<T>, Diagnostic>> =
         pool.install(|| units.par_iter().with_max_len(1).map(|own| one(own, IfClaimed::Skip)).collect());
     // Those on which other processes are at work: they are done, or the processes have ended.
     let claimed = units.iter().zip(&mut outcomes).filter(|(_, outcome)| matches!(outcome, Ok(None)));
@@ -58,10 +65,10 @@ pub fn all<U: Sync, T: Send>(
         match outcome {
             Ok(outcome) => done.extend(outcome),
             // A fault of the store, rather than the interruption that follows from it.
-            Err(error) => match &ended {
-                None | Some(FleetError::Interrupted) => ended = Some(error),
-                Some(_) => {}
-            },
+            Err(error) if ended.as_ref().is_none_or(|earlier: &Diagnostic| earlier.code == INTERRUPTED) => {
+                ended = Some(error)
+            }
+            Err(_) => {}
         }
     }
     Pooled { done, ended }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use abbe_identify::IdentifyError;
+use abbe_identify::error::NOT_APPLICABLE;
 use abbe_identify::fit::Fit;
 use abbe_identify::fit::base::{Gauge, base_parameters};
 use abbe_identify::model_file::InputFile;
@@ -110,13 +110,13 @@ impl BaseRecord {
     ///
     /// # Errors
     /// If the model cannot be evaluated.
-    pub fn of(problem: &Problem, fit: &Fit) -> Result<Option<BaseRecord>, IdentifyError> {
+    pub fn of(problem: &Problem, fit: &Fit) -> Result<Option<BaseRecord>, Diagnostic> {
         if fit.rank.null_space.ncols() == 0 {
             return Ok(None);
         }
         let base = match base_parameters(problem, fit, Gauge::OwnDirection) {
             Ok(base) => base,
-            Err(IdentifyError::NotApplicable { .. }) => return Ok(None),
+            Err(error) if error.code == NOT_APPLICABLE => return Ok(None),
             Err(error) => return Err(error),
         };
         let list = &problem.parameters.list;

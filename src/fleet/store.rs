@@ -10,13 +10,14 @@ use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use abbe_model::Diagnostic;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::FleetError;
 use super::record::{Record, SCHEMA_VERSION};
 use super::study::draw::Draw;
+use super::{interrupted, unreadable, unusable, unwritable};
 use crate::temporary::{self, TemporaryFile};
 
 /// Records with their sessions, and what has no record: its machine where it is known, and the file.
@@ -103,13 +104,13 @@ const WAIT: Duration = Duration::from_millis(100);
 /// Looks for a result, and claims it if it is missing.
 ///
 /// # Errors
-/// Those of the two; [`FleetError::Interrupted`] if `should_continue` returned `false` while another process was at work.
+/// Those of the two; `INTERRUPTED` if `should_continue` returned `false` while another process was at work.
 pub(crate) fn found_or_claimed<T>(
-    found: impl Fn() -> Result<Option<T>, FleetError>,
-    claim: impl Fn() -> Result<Option<Claim>, FleetError>,
+    found: impl Fn() -> Result<Option<T>, Diagnostic>,
+    claim: impl Fn() -> Result<Option<Claim>, Diagnostic>,
     if_claimed: IfClaimed,
     should_continue: &(dyn Fn() -> bool + Sync),
-) -> Result<Search<T>, FleetError> {
+) -> Result<Search<T>, Diagnostic> {
     loop {
         if let Some(result) = found()? {
             return Ok(Search::Found(result));
@@ -122,7 +123,7 @@ pub(crate) fn found_or_claimed<T>(
             return Ok(Search::Skipped);
         }
         if !should_continue() {
-            return Err(FleetError::Interrupted);
+            return Err(interrupted());
         }
         std::thread::sleep(WAIT);
     }
@@ -133,10 +134,9 @@ impl Store {
     ///
     /// # Errors
     /// If it cannot be made, or is a file.
-    pub fn open(folder: impl Into<PathBuf>) -> Result<Store, FleetError> {
+    pub fn open(folder: impl Into<PathBuf>) -> Result<Store, Diagnostic> {
         let folder = folder.into();
-        std::fs::create_dir_all(&folder)
-            .map_err(|source| FleetError::Write { path: folder.display().to_string(), source })?;
+        std::fs::create_dir_all(&folder).map_err(|source| unwritable(&folder, source))?;
         Ok(Store { folder })
     }
 
@@ -144,11 +144,11 @@ impl Store {
     ///
     /// # Errors
     /// If the folder holds no records.
-    pub fn existing(folder: impl Into<PathBuf>) -> Result<Store, FleetError> {
+    pub fn existing(folder: impl Into<PathBuf>) -> Result<Store, Diagnostic> {
         let folder = folder.into();
         if !folder.join("sessions").is_dir() {
             let found = "no results of `abbe fleet run` are there";
-            return Err(FleetError::unusable(folder.display(), found, "name its folder of --out"));
+            return Err(unusable(folder.display(), found, "name its folder of --out"));
         }
         Ok(Store { folder })
     }
@@ -157,7 +157,7 @@ impl Store {
     ///
     /// # Errors
     /// If an existing file cannot be read.
-    pub fn record(&self, key: &str) -> Result<Option<Record>, FleetError> {
+    pub fn record(&self, key: &str) -> Result<Option<Record>, Diagnostic> {
         let Some(contents) = read(&self.place("results", key))? else {
             return Ok(None);
         };
@@ -169,7 +169,7 @@ impl Store {
     ///
     /// # Errors
     /// If it cannot be written. Nothing is left of it then.
-    pub fn write(&self, record: &Record) -> Result<(), FleetError> {
+    pub fn write(&self, record: &Record) -> Result<(), Diagnostic> {
         self.put(&self.place("results", &record.key), record)
     }
 
@@ -177,7 +177,7 @@ impl Store {
     ///
     /// # Errors
     /// If nothing can be written there.
-    pub fn claim(&self, key: &str) -> Result<Option<Claim>, FleetError> {
+    pub fn claim(&self, key: &str) -> Result<Option<Claim>, Diagnostic> {
         self.claim_place(&self.place("results", key))
     }
 
@@ -185,14 +185,14 @@ impl Store {
     ///
     /// # Errors
     /// If nothing can be written there.
-    pub fn claim_draw(&self, study: &str, number: usize) -> Result<Option<Claim>, FleetError> {
+    pub fn claim_draw(&self, study: &str, number: usize) -> Result<Option<Claim>, Diagnostic> {
         self.claim_place(&self.place_of_draw(study, number))
     }
 
-    fn claim_place(&self, result: &Path) -> Result<Option<Claim>, FleetError> {
+    fn claim_place(&self, result: &Path) -> Result<Option<Claim>, Diagnostic> {
         let name = result.file_stem().unwrap_or_default().to_string_lossy();
         let place = result.with_file_name(format!(".{name}{CLAIM}"));
-        let fault = |source| FleetError::Write { path: place.display().to_string(), source };
+        let fault = |source| unwritable(&place, source);
         std::fs::create_dir_all(result.parent().unwrap_or(&self.folder)).map_err(fault)?;
         let file = OpenOptions::new().create(true).truncate(false).write(true).open(&place).map_err(fault)?;
         match file.try_lock() {
@@ -213,7 +213,7 @@ impl Store {
     ///
     /// # Errors
     /// If an existing file cannot be read.
-    pub fn draw(&self, study: &str, number: usize) -> Result<Option<Draw>, FleetError> {
+    pub fn draw(&self, study: &str, number: usize) -> Result<Option<Draw>, Diagnostic> {
         let contents = read(&self.place_of_draw(study, number))?;
         Ok(contents.and_then(|contents| serde_json::from_slice(&contents).ok()))
     }
@@ -222,7 +222,7 @@ impl Store {
     ///
     /// # Errors
     /// If it cannot be written. Nothing is left of it then.
-    pub fn write_draw(&self, study: &str, draw: &Draw) -> Result<(), FleetError> {
+    pub fn write_draw(&self, study: &str, draw: &Draw) -> Result<(), Diagnostic> {
         self.put(&self.place_of_draw(study, draw.number), draw)
     }
 
@@ -236,7 +236,7 @@ impl Store {
     ///
     /// # Errors
     /// If the note cannot be read or written.
-    pub fn note(&self, pointer: &Pointer) -> Result<(), FleetError> {
+    pub fn note(&self, pointer: &Pointer) -> Result<(), Diagnostic> {
         let place = self.place_of_note(pointer);
         let known = read(&place)?.and_then(|contents| serde_json::from_slice::<Pointer>(&contents).ok());
         if known.as_ref() == Some(pointer) {
@@ -249,7 +249,7 @@ impl Store {
     ///
     /// # Errors
     /// If the folder cannot be read.
-    pub fn sessions(&self) -> Result<(Vec<Pointer>, Vec<String>), FleetError> {
+    pub fn sessions(&self) -> Result<(Vec<Pointer>, Vec<String>), Diagnostic> {
         let (mut found, mut damaged) = (Vec::new(), Vec::new());
         // A file system or its browser may leave files of its own (.DS_Store).
         for shard in entries(&self.folder.join("sessions"))?.into_iter().filter(|shard| shard.is_dir()) {
@@ -274,7 +274,7 @@ impl Store {
     ///
     /// # Errors
     /// If the folder cannot be read.
-    pub fn records(&self) -> Result<Records, FleetError> {
+    pub fn records(&self) -> Result<Records, Diagnostic> {
         let (sessions, damaged) = self.sessions()?;
         let mut missing: Vec<(Option<String>, String)> = damaged.into_iter().map(|file| (None, file)).collect();
         let mut records = Vec::with_capacity(sessions.len());
@@ -293,7 +293,7 @@ impl Store {
     ///
     /// # Errors
     /// If the folder cannot be read, or a note cannot be removed.
-    pub fn forget_missing(&self, places: &[PathBuf]) -> Result<Vec<String>, FleetError> {
+    pub fn forget_missing(&self, places: &[PathBuf]) -> Result<Vec<String>, Diagnostic> {
         if !self.folder.join("sessions").is_dir() {
             return Ok(Vec::new());
         }
@@ -307,7 +307,7 @@ impl Store {
             if is_gone && note.is_file() && places.iter().any(|place| file.starts_with(place)) {
                 match std::fs::remove_file(&note) {
                     Err(source) if source.kind() != ErrorKind::NotFound => {
-                        return Err(FleetError::Write { path: note.display().to_string(), source });
+                        return Err(unwritable(&note, source));
                     }
                     _ => forgotten.push(pointer.file),
                 }
@@ -328,8 +328,8 @@ impl Store {
         self.folder.join(kind).join(name.get(..2).unwrap_or("00")).join(format!("{name}.json"))
     }
 
-    fn put(&self, place: &Path, contents: &impl Serialize) -> Result<(), FleetError> {
-        let fault = |source| FleetError::Write { path: place.display().to_string(), source };
+    fn put(&self, place: &Path, contents: &impl Serialize) -> Result<(), Diagnostic> {
+        let fault = |source| unwritable(place, source);
         let mut text = serde_json::to_vec(contents).map_err(|error| fault(error.into()))?;
         text.push(b'\n');
         let folder = place.parent().unwrap_or(&self.folder);
@@ -345,8 +345,8 @@ const MAX_BYTES: u64 = 64 << 20;
 
 /// The contents of a file; `None` if there is none. What this program did not write, a device or a file beyond the
 /// limit, counts as none.
-fn read(file: &Path) -> Result<Option<Vec<u8>>, FleetError> {
-    let fault = |source| FleetError::Read { path: file.display().to_string(), source };
+fn read(file: &Path) -> Result<Option<Vec<u8>>, Diagnostic> {
+    let fault = |source| unreadable(file, source);
     // A pipe would block, and a device has no end.
     match std::fs::metadata(file) {
         Ok(found) if !found.is_file() || found.len() > MAX_BYTES => return Ok(None),
@@ -381,8 +381,8 @@ fn remove_stale_below(folder: &Path, levels: usize) {
     }
 }
 
-fn entries(folder: &Path) -> Result<Vec<PathBuf>, FleetError> {
-    let fault = |source| FleetError::Read { path: folder.display().to_string(), source };
+fn entries(folder: &Path) -> Result<Vec<PathBuf>, Diagnostic> {
+    let fault = |source| unreadable(folder, source);
     std::fs::read_dir(folder).map_err(fault)?.map(|entry| entry.map(|entry| entry.path()).map_err(fault)).collect()
 }
 

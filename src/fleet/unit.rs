@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 
 use abbe_files::stamp::FileStamp;
 use abbe_files::{ReadOptions, Source, SourceMap};
-use abbe_identify::IdentifyError;
 use abbe_identify::model_file::{self, InputFile};
+use abbe_model::Diagnostic;
 use abbe_model::document::{of_domain, print};
 use abbe_model::session::Session;
 use abbe_trace::SessionFit;
@@ -21,7 +21,7 @@ use sha2::{Digest, Sha256};
 use super::options::Options;
 use super::record::{BaseRecord, EffectRecord, ErrorRecord, MachineRecord, Record, SCHEMA_VERSION, ValidationRecord};
 use super::store::{IfClaimed, Pointer, Search, Store, found_or_claimed};
-use super::{BUILD, FleetError};
+use super::{BUILD, interrupted};
 
 /// Bits of a seed: every reader of JSON keeps an integer of this size.
 const SEED_BITS: u32 = 52;
@@ -70,7 +70,7 @@ pub fn run(
     store: &Store,
     if_claimed: IfClaimed,
     should_continue: &(dyn Fn() -> bool + Sync),
-) -> Result<Option<(Done, Pointer)>, FleetError> {
+) -> Result<Option<(Done, Pointer)>, Diagnostic> {
     let inputs = inputs(file, options, places);
     let key = inputs.record.key.clone();
     let (done, record) =
@@ -91,13 +91,13 @@ pub fn run(
 /// The record of a session, without a store.
 ///
 /// # Errors
-/// [`FleetError::Interrupted`] if `should_continue` returned `false`.
+/// `INTERRUPTED` if `should_continue` returned `false`.
 pub fn analyse(
     file: &Path,
     options: &Options,
     places: &Places,
     should_continue: &(dyn Fn() -> bool + Sync),
-) -> Result<Record, FleetError> {
+) -> Result<Record, Diagnostic> {
     record(inputs(file, options, places), should_continue)
 }
 
@@ -194,7 +194,7 @@ fn model_of(machine_id: &str, places: &Places) -> Option<Model> {
 }
 
 /// Analyses what was read.
-fn record(inputs: Inputs, should_continue: &(dyn Fn() -> bool + Sync)) -> Result<Record, FleetError> {
+fn record(inputs: Inputs, should_continue: &(dyn Fn() -> bool + Sync)) -> Result<Record, Diagnostic> {
     let Inputs { read, mut record, model } = inputs;
     let failed = |record: Record, stage: &str, message: String| {
         let error = Some(ErrorRecord { stage: stage.to_string(), message });
@@ -208,7 +208,7 @@ fn record(inputs: Inputs, should_continue: &(dyn Fn() -> bool + Sync)) -> Result
     // A fault of the program in one session must not end the others.
     let analysed = catch_unwind(AssertUnwindSafe(|| identify(&mut record, &session, should_continue)));
     match analysed {
-        _ if !should_continue() => return Err(FleetError::Interrupted),
+        _ if !should_continue() => return Err(interrupted()),
         Ok(Ok(())) => {}
         Ok(Err(error)) => return failed(record, stage, error.to_string()),
         Err(_) => return failed(record, stage, FAULT.to_string()),
@@ -246,7 +246,7 @@ fn identify(
     record: &mut Record,
     session: &Session,
     should_continue: &(dyn Fn() -> bool + Sync),
-) -> Result<(), IdentifyError> {
+) -> Result<(), Diagnostic> {
     if record.options.no_trace {
         let found = SessionFit::of(session, record.seed)?;
         record.base = BaseRecord::of(&found.problem, &found.fit)?;

@@ -1,7 +1,6 @@
 //! The result of a fit: goodness of fit, both propagations of uncertainty, all figures for a spreadsheet.
 
 use abbe::document::StatedFit;
-use abbe::identify::IdentifyError;
 use abbe::identify::circular::CircularTest;
 use abbe::identify::figure::{Definition, Figure};
 use abbe::identify::fit::Fit;
@@ -10,6 +9,7 @@ use abbe::identify::results::{Estimate, FitMonteCarlo, FitResult, ModelResult, N
 use abbe::identify::series::{spectrum, views};
 use abbe::identify::statements::has_candidates;
 use abbe::identify::tolerance::Conformity;
+use abbe::model::Diagnostic;
 use abbe::model::words::counted;
 
 use super::block::{Level, Report, Sentence, Text};
@@ -35,7 +35,7 @@ pub fn report(
     stated: &StatedFit<'_>,
     commands: &Commands,
     figures: bool,
-) -> Result<Report, IdentifyError> {
+) -> Result<Report, Diagnostic> {
     let (result, statements) = (stated.result, &stated.statements);
     let model = &result.model;
     let mut report = Report::new(format!("Fit of {}", problem.session.machine.name));

@@ -1,9 +1,9 @@
 //! Every reading of a session with its residual, for spreadsheets.
 
-use abbe::identify::IdentifyError;
 use abbe::identify::directions::{DirectionFrame, views};
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
+use abbe::model::Diagnostic;
 use abbe::model::instrument::channel;
 use abbe::model::session::readings::Readings;
 
@@ -88,7 +88,7 @@ pub fn residuals(problem: &Problem, fit: &Fit) -> Table {
 ///
 /// # Errors
 /// If the session is of another instrument.
-pub fn by_direction(problem: &Problem, fit: &Fit) -> Result<Table, IdentifyError> {
+pub fn by_direction(problem: &Problem, fit: &Fit) -> Result<Table, Diagnostic> {
     let mut columns: Vec<Column> = ["test", "run"].map(words).into();
     columns.extend(axes(problem));
     columns.extend(DIRECTIONS.map(|name| numbers(format!("{name}_um"))));

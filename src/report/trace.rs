@@ -1,12 +1,12 @@
 //! The result of a trace: verdict, effects, the residual before and after, parameters that changed.
 
 use abbe::document::StatedTrace;
-use abbe::identify::IdentifyError;
 use abbe::identify::noise::NoiseSource;
 use abbe::identify::results::{
     EffectResult, GoodnessVerdict, ModelResult, NextStep, NotJudged, PriorResult, TraceResult, TraceVerdict,
 };
 use abbe::identify::series::{spectrum, views};
+use abbe::model::Diagnostic;
 use abbe::model::session::Session;
 use abbe::model::words::counted;
 use abbe::trace::TraceOutcome;
@@ -36,7 +36,7 @@ pub fn report(
     stated: &StatedTrace<'_>,
     commands: &Commands,
     figures: bool,
-) -> Result<Report, IdentifyError> {
+) -> Result<Report, Diagnostic> {
     let (result, statements) = (stated.result, &stated.statements);
     let commands = &commands.clone().with_effects(!result.effects.is_empty());
     let problem = &trace.after;

@@ -10,7 +10,7 @@
 use std::cmp::Ordering;
 use std::collections::HashSet;
 
-use abbe_identify::error::IdentifyError;
+use abbe_model::Diagnostic;
 use abbe_model::effect::Shape;
 
 use super::constants::{INDISTINGUISHABLE, MAX_COMPETING, MIN_COSINE, SAME_READINGS};
@@ -125,7 +125,7 @@ pub(super) fn aliases(
     k: usize,
     model: &TrainedModel<'_>,
     variance: f64,
-) -> Result<(Vec<Alias>, Vec<CompetingEffect>), IdentifyError> {
+) -> Result<(Vec<Alias>, Vec<CompetingEffect>), Diagnostic> {
     let selected = &search.selected()[k];
     let of_named = model.gain(selected.candidate)?;
     let least = search.evidence_for(selected.candidate, &of_named, variance) - INDISTINGUISHABLE;
@@ -200,9 +200,9 @@ fn mark_variants(
     model: &TrainedModel<'_>,
     variance: f64,
     aliases: &mut [Alias],
-) -> Result<(), IdentifyError> {
+) -> Result<(), Diagnostic> {
     let same = SAME_READINGS.powi(2) * variance * search.columns.rows() as f64;
-    let is_variant = |one: usize, other: usize| -> Result<bool, IdentifyError> {
+    let is_variant = |one: usize, other: usize| -> Result<bool, Diagnostic> {
         let [a, b] = [one, other].map(|candidate| search.effect(candidate));
         let alike = a.component == b.component && a.driver == b.driver && a.tests == b.tests;
         Ok(alike && model.difference_square([one, other])? < same)

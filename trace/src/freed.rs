@@ -1,9 +1,9 @@
 //! How a search for effects treats a session that its readings contradict.
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::{Fit, fit};
 use abbe_identify::plausibility::{ConflictKind, Plausibility, Pulls};
 use abbe_identify::problem::Problem;
+use abbe_model::Diagnostic;
 use abbe_model::session::Prior;
 
 /// Maximum number of rounds: a conflict may appear only after another is removed.
@@ -38,7 +38,7 @@ fn has_priors(problem: &Problem) -> bool {
 ///
 /// # Errors
 /// If the freed problem cannot be fitted.
-pub fn with_set_ups_freed(problem: &mut Problem, before: &Fit) -> Result<Option<(Vec<String>, Fit)>, IdentifyError> {
+pub fn with_set_ups_freed(problem: &mut Problem, before: &Fit) -> Result<Option<(Vec<String>, Fit)>, Diagnostic> {
     if !has_priors(problem) {
         return Ok(None);
     }

@@ -1,11 +1,11 @@
 //! A trace of a session whose readings contradict it. The trace states the contradiction first. It does not search if
 //! the readings belong to another session. It accepts no effect that only represents a wrong set-up value.
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::{self, Fit};
 use abbe_identify::plausibility::{self, Plausibility, Pulls};
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{Remainder, TraceResult, TraceVerdict};
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 
 use super::TraceOutcome;
@@ -27,7 +27,7 @@ impl Contradicted {
     ///
     /// # Errors
     /// If the problem cannot be fitted without the set-up priors.
-    pub fn of(problem: &Problem, fit: &Fit) -> Result<Contradicted, IdentifyError> {
+    pub fn of(problem: &Problem, fit: &Fit) -> Result<Contradicted, Diagnostic> {
         let mut contradicted =
             Contradicted { plausibility: plausibility::examine(problem, fit), parameters: Vec::new(), freed: None };
         let mut freed = problem.clone();
@@ -51,7 +51,7 @@ impl Contradicted {
     ///
     /// # Errors
     /// If the model with the effects cannot be fitted.
-    pub fn contradicted_by(&self, problem: &Problem, fitted: &Fit, effects: &[Effect]) -> Result<bool, IdentifyError> {
+    pub fn contradicted_by(&self, problem: &Problem, fitted: &Fit, effects: &[Effect]) -> Result<bool, Diagnostic> {
         if effects.is_empty() {
             return Ok(true);
         }
@@ -98,7 +98,7 @@ impl Contradicted {
     }
 
     /// The trace that ends before its search.
-    pub fn outcome_without_search(&self, problem: Problem, fit: Fit) -> Result<TraceOutcome, IdentifyError> {
+    pub fn outcome_without_search(&self, problem: Problem, fit: Fit) -> Result<TraceOutcome, Diagnostic> {
         let mut result = TraceResult {
             verdict: TraceVerdict::Unexplained,
             remainder: Remainder {

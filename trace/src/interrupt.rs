@@ -1,6 +1,7 @@
 //! Interrupts a trace: the caller can stop it at any time and gets the effects found so far.
 
-use abbe_identify::error::IdentifyError;
+use abbe_identify::error;
+use abbe_model::Diagnostic;
 
 use super::Progress;
 
@@ -12,8 +13,8 @@ impl Interrupt<'_> {
     /// Returns if the trace continues.
     ///
     /// # Errors
-    /// [`IdentifyError::Interrupted`] if the caller stops the trace.
-    pub fn check(&self) -> Result<(), IdentifyError> {
-        if (self.0)(Progress::Working) { Ok(()) } else { Err(IdentifyError::Interrupted) }
+    /// `INTERRUPTED` if the caller stops the trace.
+    pub fn check(&self) -> Result<(), Diagnostic> {
+        if (self.0)(Progress::Working) { Ok(()) } else { Err(error::interrupted()) }
     }
 }

@@ -1,9 +1,9 @@
 //! Refits all parameters with the found effects, and tests the residual for remaining structure.
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::{Fit, prepare_with, refit};
 use abbe_identify::noise::{Noise, NoiseSource};
 use abbe_identify::problem::Problem;
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 
 use super::constants::SINGLE;
@@ -32,7 +32,7 @@ impl RefittedModel {
         search: &SearchState<'_>,
         options: &TraceOptions,
         structure_before: Option<&Structure>,
-    ) -> Result<RefittedModel, IdentifyError> {
+    ) -> Result<RefittedModel, Diagnostic> {
         search.forget_chosen();
         let effects: Vec<Effect> = selected_effects(search).cloned().collect();
         if effects.is_empty() {
@@ -101,7 +101,7 @@ pub(super) fn noise_is_from_search(of_search: &Noise, of_fit: &Noise) -> bool {
 ///
 /// # Errors
 /// If the iterations do not converge.
-pub(super) fn with_noise_of_fit(problem: &Problem, fit: &Fit) -> Result<Option<(Problem, Fit)>, IdentifyError> {
+pub(super) fn with_noise_of_fit(problem: &Problem, fit: &Fit) -> Result<Option<(Problem, Fit)>, Diagnostic> {
     let stated = problem.session.stated_noise_mm().map(|stated_mm| Noise::white(stated_mm, NoiseSource::Stated));
     match stated.filter(|stated| !noise_is_from_search(&problem.noise, stated)) {
         Some(noise) if problem.noise.source == NoiseSource::Repeats => {
@@ -121,7 +121,7 @@ pub(super) fn structure(
     options: &TraceOptions,
     seed: u64,
     should_continue: &(dyn Fn() -> bool + Sync),
-) -> Result<Structure, IdentifyError> {
+) -> Result<Structure, Diagnostic> {
     let columns = Columns::of_readings(problem);
     let start = Start::of(problem, &columns, fit)?;
     let count = options.null_draw_count();

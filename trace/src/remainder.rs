@@ -6,10 +6,11 @@
 
 use std::ops::Range;
 
-use abbe_identify::error::IdentifyError;
+use abbe_identify::error;
 use abbe_identify::numerics::parallel;
 use abbe_identify::numerics::tails::ln_chi_square_tail;
 use abbe_identify::problem::Problem;
+use abbe_model::Diagnostic;
 use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::driver::Driver;
 use abbe_model::effect::shape::{Curve, Local, Periodic};
@@ -224,13 +225,13 @@ impl<'d> Batch<'d> {
 /// Tests the residual of a fit for structure that its model does not explain.
 ///
 /// # Errors
-/// If products are not finite, or [`IdentifyError::Interrupted`] if `should_continue` returns `false`.
+/// If products are not finite, or `INTERRUPTED` if `should_continue` returns `false`.
 pub(super) fn structure(
     problem: &Problem,
     start: &Start,
     null: &dyn DrawSource,
     should_continue: &(dyn Fn() -> bool + Sync),
-) -> Result<Structure, IdentifyError> {
+) -> Result<Structure, Diagnostic> {
     structure_by_batches(problem, start, null, MAX_ENTRIES, should_continue)
 }
 
@@ -241,7 +242,7 @@ fn structure_by_batches(
     null: &dyn DrawSource,
     max_entries: usize,
     should_continue: &(dyn Fn() -> bool + Sync),
-) -> Result<Structure, IdentifyError> {
+) -> Result<Structure, Diagnostic> {
     let columns = &Columns::of_readings(problem);
     let detectors = detectors(problem);
     let mut batch = Batch::of(&detectors, columns, max_entries);
@@ -255,7 +256,7 @@ fn structure_by_batches(
     let mut null_best = vec![f64::NEG_INFINITY; first.draws()];
     loop {
         if !should_continue() {
-            return Err(IdentifyError::Interrupted);
+            return Err(error::interrupted());
         }
         let mut gram = first.clone();
         if in_batches {
@@ -312,7 +313,7 @@ mod tests {
         let rows = start.residual.len();
         let draws = Given(3, move |_| vec![0.0; rows]);
         let tested = |should_continue: bool| structure(&problem, &start, &draws, &|| should_continue);
-        assert!(matches!(tested(false), Err(IdentifyError::Interrupted)));
+        assert_eq!(tested(false).err(), Some(error::interrupted()));
         // One of four: no draw has structure.
         assert_eq!(tested(true).unwrap().p_value, 0.25);
     }

@@ -1,10 +1,11 @@
 //! Screens the library for a session: which effects apply to its readings, and which are observable in addition to the
 //! declared parameters.
 
-use abbe_identify::error::IdentifyError;
+use abbe_identify::error::NOT_IN_THE_LIBRARY;
 use abbe_identify::fit::prepare;
 use abbe_identify::numerics::parallel;
 use abbe_identify::problem::Problem;
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 
@@ -33,7 +34,7 @@ pub struct ScreenedEffect {
 ///
 /// # Errors
 /// If the session cannot be fitted.
-pub fn screened_effects(session: &Session, options: &TraceOptions) -> Result<Vec<ScreenedEffect>, IdentifyError> {
+pub fn screened_effects(session: &Session, options: &TraceOptions) -> Result<Vec<ScreenedEffect>, Diagnostic> {
     let (problem, fit) = prepare(session, options.seed)?;
     let columns = Columns::new(&problem, &fit.beta);
     let start = Start::of(&problem, &columns, &fit)?;
@@ -64,15 +65,22 @@ pub(super) fn searched_candidates(
     problem: &Problem,
     columns: &Columns<'_>,
     options: &TraceOptions,
-) -> Result<Vec<Candidate>, IdentifyError> {
+) -> Result<Vec<Candidate>, Diagnostic> {
     let mut candidates = library::candidates(problem)?;
     if let Some(text) = matching_no_candidate(&candidates, &options.only).next() {
-        return Err(IdentifyError::NotInTheLibrary { text: text.clone() });
+        return Err(Diagnostic::coded(
+            NOT_IN_THE_LIBRARY,
+            format!(
+                "no candidate effect of this session contains `{text}` in its identifier; identifiers look like EZC~C:h2"
+            ),
+        ));
     }
     let all = candidates.len();
     candidates.retain(|candidate| is_requested(options, &candidate.effect.id()));
     if candidates.is_empty() && all > 0 {
-        return Err(IdentifyError::EverythingLeftOut);
+        return Err(Diagnostic::identification(
+            "no candidate effects remain: the exclusions remove every selected effect; exclude fewer effects",
+        ));
     }
     let column_sets = parallel::map(candidates.len(), &|k| columns.effect_columns(&candidates[k].effect));
     let found = candidates.into_iter().zip(column_sets);
@@ -85,7 +93,7 @@ pub(super) fn unused_exclusions(
     problem: &Problem,
     options: &TraceOptions,
     in_groups: &[String],
-) -> Result<Vec<String>, IdentifyError> {
+) -> Result<Vec<String>, Diagnostic> {
     let candidates = library::candidates(problem)?;
     let is_in_groups = |text: &&String| in_groups.iter().any(|id| id.contains(text.as_str()));
     Ok(matching_no_candidate(&candidates, &options.exclude)

@@ -3,7 +3,7 @@
 //! best remaining candidate is no better than the best on readings without structure and no move finds a better set, or
 //! when additions do not lower the held-out error.
 
-use abbe_identify::error::IdentifyError;
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 
 use super::constants::MAX_REJECTED_IN_A_ROW;
@@ -56,13 +56,13 @@ enum Round {
 /// error. Returns the p-value at which the search ended ([`search_on`]) and the refitted model.
 ///
 /// # Errors
-/// [`IdentifyError::Interrupted`] if the caller stopped the trace. [`SearchState::roll_back`] then restores the
+/// `INTERRUPTED` if the caller stopped the trace. [`SearchState::roll_back`] then restores the
 /// accepted effects.
 pub(super) fn search_and_refit(
     search: &mut SearchState<'_>,
     record: &mut SearchRecord<'_>,
-    judge: impl Fn(&SearchState<'_>) -> Result<RefittedModel, IdentifyError>,
-) -> Result<(f64, RefittedModel), IdentifyError> {
+    judge: impl Fn(&SearchState<'_>) -> Result<RefittedModel, Diagnostic>,
+) -> Result<(f64, RefittedModel), Diagnostic> {
     let (mut ended, mut judged) = search_to_curves(search, record, &judge)?;
     if let Some(smooth) = with_smooth_shapes(search, record, &judge)? {
         (ended, judged) = smooth;
@@ -93,8 +93,8 @@ pub(super) fn search_and_refit(
 fn search_to_curves(
     search: &mut SearchState<'_>,
     record: &mut SearchRecord<'_>,
-    judge: &impl Fn(&SearchState<'_>) -> Result<RefittedModel, IdentifyError>,
-) -> Result<(f64, RefittedModel), IdentifyError> {
+    judge: &impl Fn(&SearchState<'_>) -> Result<RefittedModel, Diagnostic>,
+) -> Result<(f64, RefittedModel), Diagnostic> {
     let mut ended = search_on(search, record)?;
     (record.progress)(Progress::Judging);
     let mut judged = judge(search)?;
@@ -114,8 +114,8 @@ fn search_to_curves(
 fn with_smooth_shapes(
     search: &mut SearchState<'_>,
     record: &mut SearchRecord<'_>,
-    judge: &impl Fn(&SearchState<'_>) -> Result<RefittedModel, IdentifyError>,
-) -> Result<Option<(f64, RefittedModel)>, IdentifyError> {
+    judge: &impl Fn(&SearchState<'_>) -> Result<RefittedModel, Diagnostic>,
+) -> Result<Option<(f64, RefittedModel)>, Diagnostic> {
     if !search.has_staircase() {
         return Ok(None);
     }
@@ -132,7 +132,7 @@ fn with_smooth_shapes(
 
 /// Runs rounds until no candidate is significant, or until additions do not lower the held-out error. The accepted
 /// effects remain. Returns the p-value of the best candidate that was not added.
-fn search_on(search: &mut SearchState<'_>, record: &mut SearchRecord<'_>) -> Result<f64, IdentifyError> {
+fn search_on(search: &mut SearchState<'_>, record: &mut SearchRecord<'_>) -> Result<f64, Diagnostic> {
     // Additions since the last acceptance.
     let mut pending = Vec::new();
     let mut ended = None;
@@ -157,7 +157,7 @@ fn search_on(search: &mut SearchState<'_>, record: &mut SearchRecord<'_>) -> Res
 }
 
 /// Adds the best candidate if it is significant, and improves the selected effects.
-fn round(search: &mut SearchState<'_>, record: &mut SearchRecord<'_>) -> Result<Round, IdentifyError> {
+fn round(search: &mut SearchState<'_>, record: &mut SearchRecord<'_>) -> Result<Round, Diagnostic> {
     let (p_value, added) = add_best(search, record)?;
     if let Some(candidate) = added {
         for name in search.policy.after_addition {
@@ -174,10 +174,7 @@ fn round(search: &mut SearchState<'_>, record: &mut SearchRecord<'_>) -> Result<
 }
 
 /// Adds the best candidate if it is significant. Returns its p-value, and the candidate if it was added.
-fn add_best(
-    search: &mut SearchState<'_>,
-    record: &mut SearchRecord<'_>,
-) -> Result<(f64, Option<usize>), IdentifyError> {
+fn add_best(search: &mut SearchState<'_>, record: &mut SearchRecord<'_>) -> Result<(f64, Option<usize>), Diagnostic> {
     let Some((best, p_value, threshold)) = search.best_against_null()? else {
         return Ok((1.0, None));
     };
@@ -204,7 +201,7 @@ fn add_best(
 /// Whether an addition lowers the held-out error. If the policy tries several candidates, the significant ones of other
 /// components and drivers are added in place of the first, each to the branches as they were before; the addition with the
 /// lowest held-out error remains.
-fn lowers_heldout(search: &mut SearchState<'_>, before: &[SearchBranch]) -> Result<bool, IdentifyError> {
+fn lowers_heldout(search: &mut SearchState<'_>, before: &[SearchBranch]) -> Result<bool, Diagnostic> {
     let before_heldout = search.selection.held_out.last().copied().unwrap_or(f64::INFINITY);
     let mut lowest = (search.held_out_now()?, search.selection.branches.clone());
     for _ in 1..search.policy.tried {

@@ -3,11 +3,11 @@
 //! A decision about a limit needs a model that lacks nothing. χ² alone overlooks an effect that is small in each of many
 //! readings, so where limits are to be decided the residual is tested for structure too, by the test of the trace.
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::{Fit, prepare, report};
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{Estimate, FitResult};
 use abbe_identify::tolerance::conformity;
+use abbe_model::Diagnostic;
 use abbe_model::session::Session;
 
 use crate::trace::structure_of_fit;
@@ -29,7 +29,7 @@ impl SessionFit {
     ///
     /// # Errors
     /// If the session has no readings, or the iterations do not converge.
-    pub fn of(session: &Session, seed: u64) -> Result<SessionFit, IdentifyError> {
+    pub fn of(session: &Session, seed: u64) -> Result<SessionFit, Diagnostic> {
         let (problem, fit) = prepare(session, seed)?;
         let mut result = report(&problem, &fit)?;
         if result.conformity.is_some() && result.model.outcome.goodness.forbids_decisions().is_none() {
@@ -51,7 +51,7 @@ impl SessionFit {
 }
 
 /// Tests the residual for structure. If it has any, nothing is decided about parameters, and no estimate may be quoted.
-fn test_structure(problem: &Problem, fit: &Fit, result: &mut FitResult, seed: u64) -> Result<(), IdentifyError> {
+fn test_structure(problem: &Problem, fit: &Fit, result: &mut FitResult, seed: u64) -> Result<(), Diagnostic> {
     let Some(structure) = structure_of_fit(problem, fit, seed)?.filter(|found| found.is_significant()) else {
         return Ok(());
     };

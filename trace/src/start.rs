@@ -5,10 +5,10 @@
 
 use std::sync::Arc;
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::Fit;
 use abbe_identify::numerics::reduction::inverse_of_upper;
 use abbe_identify::problem::Problem;
+use abbe_model::Diagnostic;
 use faer::Mat;
 
 use super::state::UnwhitenedModel;
@@ -29,7 +29,7 @@ pub(super) struct Start {
 
 impl Start {
     /// Computes the start from a fit, whose triangular factors contain the readings.
-    pub fn of(problem: &Problem, columns: &Columns<'_>, fit: &Fit) -> Result<Start, IdentifyError> {
+    pub fn of(problem: &Problem, columns: &Columns<'_>, fit: &Fit) -> Result<Start, Diagnostic> {
         let parameters = fit.beta.len();
         let basis = &fit.rank.identifiable_basis;
         let rank = basis.ncols();
@@ -52,7 +52,7 @@ impl Start {
         columns: &Columns<'_>,
         beta: &[f64],
         sigma_mm: f64,
-    ) -> Result<UnwhitenedModel, IdentifyError> {
+    ) -> Result<UnwhitenedModel, Diagnostic> {
         let (mut model, mut residual) = columns.unwhitened_model_rows(beta, &self.to_parameters)?;
         model.col_iter_mut().flat_map(|column| column.iter_mut()).for_each(|value| *value /= sigma_mm);
         residual.iter_mut().for_each(|value| *value /= sigma_mm);

@@ -3,12 +3,13 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use abbe_identify::circular;
-use abbe_identify::error::IdentifyError;
+use abbe_identify::error::INTERRUPTED;
 use abbe_identify::fit::{Fit, fit, prepare, prepare_with};
 use abbe_identify::numerics::parallel;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::TraceResult;
 use abbe_identify::tolerance::conformity;
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 
@@ -110,7 +111,7 @@ pub struct TraceOutcome {
 
 impl TraceOutcome {
     /// A trace that was interrupted before its search began. It contains the declared model only.
-    pub(super) fn unsearched(problem: Problem, fit: Fit) -> Result<TraceOutcome, IdentifyError> {
+    pub(super) fn unsearched(problem: Problem, fit: Fit) -> Result<TraceOutcome, Diagnostic> {
         let mut result = result::unsearched(&problem, &fit)?;
         result.mark_interrupted();
         Ok(TraceOutcome::of_declared(problem, fit, result))
@@ -145,7 +146,7 @@ pub fn trace(
     session: &Session,
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<TraceOutcome, IdentifyError> {
+) -> Result<TraceOutcome, Diagnostic> {
     // Once the caller has stopped the trace, it is not asked again by computations that run at the same time.
     let stopped = AtomicBool::new(false);
     let progress = &|event: Progress| {
@@ -170,7 +171,7 @@ fn without_conformity(
     session: &Session,
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<TraceOutcome, IdentifyError> {
+) -> Result<TraceOutcome, Diagnostic> {
     let (problem, fitted) = prepare(session, options.seed)?;
     let contradicted = Contradicted::of(&problem, &fitted)?;
     contradicted.report(progress);
@@ -201,7 +202,7 @@ fn with_noise_of_repeats(
     mut before_fit: Fit,
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<TraceOutcome, IdentifyError> {
+) -> Result<TraceOutcome, Diagnostic> {
     before_fit = with_noise_model(&mut problem, before_fit)?;
     let residuals = before_fit.residuals.clone();
     let mut first = trace_with(problem, before_fit, &residuals, options, progress)?;
@@ -238,7 +239,7 @@ fn with_noise_of_repeats(
 }
 
 /// The fit with the noise model estimated from repeats, if they change it.
-fn with_noise_model(problem: &mut Problem, found: Fit) -> Result<Fit, IdentifyError> {
+fn with_noise_model(problem: &mut Problem, found: Fit) -> Result<Fit, Diagnostic> {
     match estimate_noise_model(problem, &found.residuals) {
         true => fit(problem, Some(&found.beta)),
         false => Ok(found),
@@ -250,7 +251,7 @@ fn with_noise_model(problem: &mut Problem, found: Fit) -> Result<Fit, IdentifyEr
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub(crate) fn structure_of_fit(problem: &Problem, fit: &Fit, seed: u64) -> Result<Option<Structure>, IdentifyError> {
+pub(crate) fn structure_of_fit(problem: &Problem, fit: &Fit, seed: u64) -> Result<Option<Structure>, Diagnostic> {
     let options = TraceOptions { seed, ..TraceOptions::default() };
     let mut problem = problem.clone();
     let fit = with_noise_model(&mut problem, fit.clone())?;
@@ -268,7 +269,7 @@ fn with_noise_less_strongest(
     first: &TraceOutcome,
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<Option<TraceOutcome>, IdentifyError> {
+) -> Result<Option<TraceOutcome>, Diagnostic> {
     let mut problem = first.before.clone();
     let Some(strongest) = &first.strongest else { return Ok(None) };
     if first.result.interrupted || !first.effects.is_empty() || problem.noise.ar_coefficients.is_empty() {
@@ -290,14 +291,14 @@ fn trace_with(
     pure: &[Vec<f64>],
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<TraceOutcome, IdentifyError> {
+) -> Result<TraceOutcome, Diagnostic> {
     match trace_or_interrupted(&problem, &before_fit, pure, options, progress) {
-        Err(IdentifyError::Interrupted) => TraceOutcome::unsearched(problem, before_fit),
+        Err(error) if error.code == INTERRUPTED => TraceOutcome::unsearched(problem, before_fit),
         traced => traced,
     }
 }
 
-/// Traces with a given noise model, and returns [`IdentifyError::Interrupted`] if it was interrupted before the search
+/// Traces with a given noise model, and returns `INTERRUPTED` if it was interrupted before the search
 /// began.
 fn trace_or_interrupted(
     problem: &Problem,
@@ -305,7 +306,7 @@ fn trace_or_interrupted(
     pure: &[Vec<f64>],
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<TraceOutcome, IdentifyError> {
+) -> Result<TraceOutcome, Diagnostic> {
     let interrupt = Interrupt(progress);
     interrupt.check()?;
     let policy = Policy::of(problem);
@@ -355,7 +356,7 @@ fn trace_or_interrupted(
         let mut gram = Gram::new(&columns, column_sets, start.model.clone(), &start.residual, start.prior());
         gram.prepare(&[], &should_continue)?;
         gram.take_draws(&blocks, Some(MAX_KEPT_DRAWS), &should_continue)?;
-        Ok::<_, IdentifyError>(gram)
+        Ok::<_, Diagnostic>(gram)
     };
     let (structure_before, gram) = match tested {
         Some(tested) => (tested, gram()),
@@ -374,7 +375,7 @@ fn trace_or_interrupted(
     let structure_before = structure_before.as_ref();
     let judge = |search: &SearchState<'_>| RefittedModel::of(problem, before_fit, search, options, structure_before);
     let found = match search_and_refit(&mut search, &mut record, judge) {
-        Err(IdentifyError::Interrupted) => {
+        Err(error) if error.code == INTERRUPTED => {
             search.roll_back();
             None
         }
@@ -431,11 +432,7 @@ fn trace_or_interrupted(
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-fn structure_of_poses(
-    problem: &Problem,
-    fit: &Fit,
-    options: &TraceOptions,
-) -> Result<Option<Structure>, IdentifyError> {
+fn structure_of_poses(problem: &Problem, fit: &Fit, options: &TraceOptions) -> Result<Option<Structure>, Diagnostic> {
     let columns = Columns::new(problem, &fit.beta);
     let start = Start::of(problem, &columns, fit)?;
     let (count, seed) = (options.null_draw_count(), options.seed.wrapping_add(2));

@@ -29,7 +29,7 @@ impl Analysis {
     pub fn of(name: &str, folder: &Folder, session: &str, options: &str, seed: u32) -> Result<Analysis, Failed> {
         let read = folder.read(session, true)?;
         let given = [Given::Session(&read.session)];
-        let analysed = analysis::run::<Failed>(name, &given, options, u64::from(seed), &tell)?;
+        let analysed = analysis::run(name, &given, options, u64::from(seed), &tell)?;
         Ok(Analysis { read, analysed })
     }
 

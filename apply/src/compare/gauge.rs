@@ -11,10 +11,10 @@
 
 use faer::Mat;
 
-use crate::ApplyError;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::numerics::null_space::{MIN_PIVOT, echelon};
 use abbe_identify::numerics::solve::Svd;
+use abbe_model::Diagnostic;
 
 /// Share of the largest singular value below which a direction is one that the others span. The null directions of two
 /// sessions of one plan differ by this little.
@@ -31,7 +31,7 @@ pub(super) fn one_gauge(
     common: &[(usize, usize)],
     delta: &mut [f64],
     covariance: &mut Mat<f64>,
-) -> Result<(Vec<usize>, Mat<f64>), ApplyError> {
+) -> Result<(Vec<usize>, Mat<f64>), Diagnostic> {
     let mut transfer = Mat::<f64>::identity(common.len(), common.len());
     let sizes: Vec<f64> = common.iter().map(|(i, _)| a.parameters[*i].size).collect();
     let of_a = a.null_directions.iter().map(|n| common.iter().map(|(i, _)| n[*i]).collect::<Vec<f64>>());

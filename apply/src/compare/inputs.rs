@@ -1,6 +1,7 @@
 //! Sessions and models as inputs of a comparison. Each session is fitted with the errors and effects of all inputs, so
 //! that their parameters are the same.
 
+use abbe_model::Diagnostic;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::effect::Effect;
@@ -8,7 +9,6 @@ use abbe_model::session::Session;
 
 use super::results::{Comparison, ExcludedReading, InputNotJudged};
 use super::{CompareOptions, Named, compare, one_machine};
-use crate::ApplyError;
 use abbe_identify::fit;
 use abbe_identify::model_file::{IdentifiedModel, Provenance};
 use abbe_identify::results::Outlier;
@@ -66,7 +66,7 @@ type NotQuotable = (bool, f64, &'static str);
 ///
 /// # Errors
 /// If a session cannot be fitted, for example because its data lack what an effect follows.
-fn models(inputs: Vec<Input>, seed: u64) -> Result<Vec<Prepared>, ApplyError> {
+fn models(inputs: Vec<Input>, seed: u64) -> Result<Vec<Prepared>, Diagnostic> {
     let mut errors: Vec<ErrorName> = Vec::new();
     let mut effects: Vec<Effect> = Vec::new();
     for input in &inputs {
@@ -112,7 +112,7 @@ pub fn compare_inputs(
     inputs: Vec<Input>,
     options: &CompareOptions,
     seed: u64,
-) -> Result<Comparison, ApplyError> {
+) -> Result<Comparison, Diagnostic> {
     for (name, input) in names.iter().zip(&inputs).skip(1) {
         one_machine((&names[0], inputs[0].machine()), (name, input.machine()))?;
     }

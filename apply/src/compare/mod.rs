@@ -27,11 +27,11 @@ pub mod workspace;
 
 use std::collections::BTreeMap;
 
+use abbe_identify::error;
+use abbe_model::Diagnostic;
 use abbe_model::chain::Machine;
 use faer::Mat;
 
-use crate::ApplyError;
-use abbe_identify::IdentifyError;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::numerics::symmetric::Symmetric;
 use abbe_identify::numerics::tails::{chi_square_tail, normal_tail};
@@ -77,29 +77,29 @@ pub struct Named<'m> {
 ///
 /// # Errors
 /// If chain, axes, rotation convention or gravity differ, with what differs.
-pub fn one_machine(a: (&str, &Machine), b: (&str, &Machine)) -> Result<(), ApplyError> {
+pub fn one_machine(a: (&str, &Machine), b: (&str, &Machine)) -> Result<(), Diagnostic> {
     let apart = differences(a.1, b.1, [a.0, b.0]);
     if apart.is_empty() {
         return Ok(());
     }
     let (one, other) = (b.0.to_string(), a.0.to_string());
-    Err(IdentifyError::Unlike { one, relation: "of one machine with", other, difference: apart.join("; ") }.into())
+    Err(error::unlike(one, "of one machine with", other, apart.join("; ")))
 }
 
 /// Two models in which nothing can be compared.
-fn apart(a: &Named<'_>, b: &Named<'_>, difference: &str) -> ApplyError {
+fn apart(a: &Named<'_>, b: &Named<'_>, difference: &str) -> Diagnostic {
     let (one, other) = (b.name.clone(), a.name.clone());
-    IdentifyError::Unlike { one, relation: "comparable with", other, difference: difference.to_string() }.into()
+    error::unlike(one, "comparable with", other, difference)
 }
 
 /// Compares each model with the first one.
 ///
 /// # Errors
 /// If there are fewer than two models, they are not of one machine, or nothing in them can be compared.
-pub fn compare(models: &[Named<'_>], options: &CompareOptions) -> Result<Comparison, ApplyError> {
+pub fn compare(models: &[Named<'_>], options: &CompareOptions) -> Result<Comparison, Diagnostic> {
     let (Some(first), Some(others @ [_, ..])) = (models.first(), models.get(1..)) else {
         let (purpose, found) = ("a comparison", models.len());
-        return Err(IdentifyError::TooFew { purpose, what: "models or sessions", least: 2, found }.into());
+        return Err(error::too_few(purpose, "models or sessions", 2, found));
     };
     let mut comparison = Comparison {
         significance: options.significance,
@@ -125,7 +125,7 @@ struct Compared {
     summary: Pair,
 }
 
-fn pair(a: &Named<'_>, b: &Named<'_>, options: &CompareOptions) -> Result<Compared, ApplyError> {
+fn pair(a: &Named<'_>, b: &Named<'_>, options: &CompareOptions) -> Result<Compared, Diagnostic> {
     let common = common(a.model, b.model);
     if common.is_empty() {
         return Err(apart(a, b, "no parameter of the machine is in common; identify the same errors in both"));
@@ -236,7 +236,7 @@ struct Metric<'k> {
 }
 
 impl Metric<'_> {
-    fn of<'k>(covariance: &Mat<f64>, kept: &'k [usize]) -> Result<Metric<'k>, ApplyError> {
+    fn of<'k>(covariance: &Mat<f64>, kept: &'k [usize]) -> Result<Metric<'k>, Diagnostic> {
         let u: Vec<f64> = kept.iter().map(|k| covariance[(*k, *k)].sqrt()).collect();
         let scaled = Mat::from_fn(kept.len(), kept.len(), |i, j| covariance[(kept[i], kept[j])] / (u[i] * u[j]));
         let eigen = Symmetric::of(scaled.as_ref())?;

@@ -15,12 +15,12 @@
 //! a fit and its prior `f·u_s`, the readings alone have the information `i = 1/C − 1/(f·u_s)²` and the estimate
 //! `l = s/(C·i)`. For one object `(l_B − l_A)²·i_A·i_B/(i_A + i_B)` is a χ² of one degree of freedom.
 
+use abbe_identify::error;
+use abbe_model::Diagnostic;
 use abbe_model::session::Prior;
 use faer::Mat;
 
 use super::results::NotShared;
-use crate::ApplyError;
-use abbe_identify::IdentifyError;
 use abbe_identify::model_file::{IdentifiedModel, ModelParameter};
 use abbe_identify::numerics::symmetric::pseudo_inverse;
 use abbe_identify::numerics::tails::normal_tail;
@@ -56,7 +56,7 @@ pub(super) fn difference(
     b: &IdentifiedModel,
     common: &[(usize, usize)],
     things: Option<&[String]>,
-) -> Result<SharedDifference, ApplyError> {
+) -> Result<SharedDifference, Diagnostic> {
     let mut shared = shared(a, b, things)?;
     let refuted = refuted(a, b, &mut shared);
     if shared.is_empty() {
@@ -75,7 +75,7 @@ pub(super) fn difference(
     };
     let mut information = Mat::<f64>::zeros(count, count);
     let mut gradient = vec![0.0; count];
-    let mut add = |model: &IdentifiedModel, place: &dyn Fn(usize) -> usize| -> Result<(), ApplyError> {
+    let mut add = |model: &IdentifiedModel, place: &dyn Fn(usize) -> usize| -> Result<(), Diagnostic> {
         let own = inverse(model)?;
         let value: Vec<f64> = (0..model.parameters.len()).map(|j| model.estimate(j)).collect();
         for i in 0..value.len() {
@@ -163,7 +163,7 @@ fn test(a: &IdentifiedModel, b: &IdentifiedModel, (i, j): (usize, usize)) -> Opt
 }
 
 /// The information of a model: the inverse of its covariance over the parameters that are not held.
-fn inverse(model: &IdentifiedModel) -> Result<Mat<f64>, ApplyError> {
+fn inverse(model: &IdentifiedModel) -> Result<Mat<f64>, Diagnostic> {
     let count = model.parameters.len();
     let scale: Vec<f64> = (0..count).map(|i| if model.u(i) > 0.0 { model.u(i).recip() } else { 0.0 }).collect();
     let scaled = Mat::from_fn(count, count, |i, j| model.covariance[(i, j)] * scale[i] * scale[j]);
@@ -179,7 +179,7 @@ fn shared(
     a: &IdentifiedModel,
     b: &IdentifiedModel,
     things: Option<&[String]>,
-) -> Result<Vec<(usize, usize)>, ApplyError> {
+) -> Result<Vec<(usize, usize)>, Diagnostic> {
     let is_setup = |p: &ModelParameter| p.role == Role::Setup && !p.held;
     let of_both = a.parameters.iter().enumerate().filter(|(_, p)| is_setup(p)).filter_map(|(i, p)| {
         let same = |q: &ModelParameter| q.id == p.id && is_setup(q) && q.prior == p.prior;
@@ -190,7 +190,7 @@ fn shared(
     let things_stated = things.unwrap_or_default();
     if things_stated.len() > 1 && things_stated.iter().any(|stated| stated == NOTHING) {
         let (one, other) = ("shared set-up quantities".to_string(), format!("\"{NOTHING}\""));
-        return Err(IdentifyError::Contradictory { one, other, remedy: "state either" }.into());
+        return Err(error::contradictory(one, other, "state either"));
     }
     for stated in things_stated.iter().filter(|stated| *stated != NOTHING) {
         if !of_both.iter().any(|(i, _)| thing(*i) == stated) {
@@ -198,7 +198,7 @@ fn shared(
             known.sort_unstable();
             known.dedup();
             let what = "set-up quantity with the same prior in both called";
-            return Err(IdentifyError::unknown("the pair of models", what, stated, "these are:", known).into());
+            return Err(error::unknown("the pair of models", what, stated, "these are:", known));
         }
     }
     of_both.retain(|(i, _)| match things {

@@ -6,6 +6,7 @@
 //!
 //! `J` is the derivative of the tool point by the errors, from dual numbers, times the basis functions of effects.
 
+use abbe_model::Diagnostic;
 use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::chain::{AxisPosition, ERRORS_PER_AXIS, Machine};
 use abbe_model::driver::Driver;
@@ -16,7 +17,6 @@ use num_dual::Dual64;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::ApplyError;
 use crate::correction::Correction;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::model_file::carried::States;
@@ -75,7 +75,7 @@ impl AxisRange {
 ///
 /// # Errors
 /// If an error cannot be evaluated on the grid.
-pub fn evaluate(models: &[&IdentifiedModel], places: usize) -> Result<Vec<VolumetricSummary>, ApplyError> {
+pub fn evaluate(models: &[&IdentifiedModel], places: usize) -> Result<Vec<VolumetricSummary>, Diagnostic> {
     let Some(first) = models.first() else { return Ok(Vec::new()) };
     let machine = &first.machine;
     let Some(ranges) = common_ranges(models) else { return Ok(Vec::new()) };
@@ -90,7 +90,7 @@ pub fn evaluate(models: &[&IdentifiedModel], places: usize) -> Result<Vec<Volume
 ///
 /// # Errors
 /// If an error cannot be evaluated on the grid.
-pub fn rms_of_moved(model: &IdentifiedModel, moved: &[MovedParameter]) -> Result<Vec<f64>, ApplyError> {
+pub fn rms_of_moved(model: &IdentifiedModel, moved: &[MovedParameter]) -> Result<Vec<f64>, Diagnostic> {
     if moved.is_empty() {
         return Ok(Vec::new());
     }
@@ -143,7 +143,7 @@ fn of_model(
     tool_mm: [f64; 3],
     grid: &Readings,
     axes: Vec<AxisRange>,
-) -> Result<VolumetricSummary, ApplyError> {
+) -> Result<VolumetricSummary, Diagnostic> {
     let machine = &model.machine;
     // A grid has neither time nor driver columns: the reference values stand for them.
     let rows = grid.rows();

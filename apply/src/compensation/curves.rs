@@ -9,12 +9,12 @@
 
 use std::ops::Range;
 
+use abbe_identify::error;
+use abbe_model::Diagnostic;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::driver::{DriverPart, DriverSample};
 use abbe_model::effect::{Component, Effect};
 
-use crate::ApplyError;
-use abbe_identify::IdentifyError;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::model_file::motion::over_own_axis;
 use abbe_identify::parameters::Role;
@@ -138,7 +138,7 @@ pub struct Compensation {
 ///
 /// # Errors
 /// If a reference position is of no axis with a curve, or outside the range of one of its curves.
-pub fn of_model(model: &IdentifiedModel, references: &[(String, f64)]) -> Result<Compensation, ApplyError> {
+pub fn of_model(model: &IdentifiedModel, references: &[(String, f64)]) -> Result<Compensation, Diagnostic> {
     let mut result = Compensation::default();
     let machine = &model.machine;
     let list = &model.parameters;
@@ -204,7 +204,7 @@ pub fn of_model(model: &IdentifiedModel, references: &[(String, f64)]) -> Result
         let within = [range[0], range[1]].map(|end| kind.to_display(end));
         if let Some(found) = stated.filter(|place| !(within[0]..=within[1]).contains(place)) {
             let name = format!("the reference position of {} in the table of {error}", error.axis);
-            return Err(IdentifyError::OutOfRange { name, found, range: within, unit: kind.unit().name() }.into());
+            return Err(error::out_of_range(name, found, within, kind.unit().name()));
         }
         let stated = stated.map(|place| kind.to_internal(place));
         let zero = stated.or((!(range[0]..=range[1]).contains(&0.0)).then_some(range[0]));
@@ -225,11 +225,11 @@ pub fn of_model(model: &IdentifiedModel, references: &[(String, f64)]) -> Result
         });
     }
     for (name, _) in references {
-        machine.axis_index(name).ok_or_else(|| IdentifyError::no_axis(machine, "", name))?;
+        machine.axis_index(name).ok_or_else(|| error::no_axis(machine, "", name))?;
         if !result.curves.iter().any(|curve| curve.error.axis == *name) {
             let found = "no table of the model is over it";
             let expected = "state the reference position of an axis whose error motions are written";
-            return Err(IdentifyError::not_applicable(format!("axis `{name}`"), found, expected).into());
+            return Err(error::not_applicable(format!("axis `{name}`"), found, expected));
         }
     }
     for curve in &mut result.curves {

@@ -7,9 +7,10 @@ mod linuxcnc;
 mod siemens;
 
 use abbe_identify::model_file::IdentifiedModel;
+use abbe_model::Diagnostic;
 
-use crate::ApplyError;
 use crate::compensation::TableFormat;
+use crate::error::unrepresentable;
 use crate::export::kinematics::{EntryChoice, KinematicModel, KinematicTable, table};
 use crate::export::travel::Travel;
 
@@ -57,10 +58,10 @@ impl Control {
         choice: EntryChoice,
         travel: &Travel,
         tool_mm: [f64; 3],
-    ) -> Result<KinematicTable, ApplyError> {
+    ) -> Result<KinematicTable, Diagnostic> {
         let refused = |holds: &str| {
             let format = format!("a table for `{}`", self.word);
-            Err(ApplyError::unrepresentable(format, "kinematic parameters", holds))
+            Err(unrepresentable(format, "kinematic parameters", holds))
         };
         match &self.kinematics {
             Kinematics::Entries(kinematics) => table(model, self.name, kinematics, choice, travel, tool_mm),

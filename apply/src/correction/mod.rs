@@ -16,13 +16,13 @@
 mod nearest;
 pub mod stream;
 
+use abbe_identify::error;
+use abbe_model::Diagnostic;
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::sensitivity::SlotValues;
 use abbe_model::session::readings::Readings;
 use nalgebra::{SVector, Vector6};
 
-use crate::ApplyError;
-use abbe_identify::IdentifyError;
 use abbe_identify::model_file::errors::MachineErrors;
 use abbe_model::pose::jacobian::{Inverse, MAX_AXES, lever_mm};
 use abbe_model::pose::{Aim, Pose, TOLERANCE_MM, TOLERANCE_RAD, size};
@@ -141,7 +141,7 @@ impl Correction<'_> {
     ///
     /// # Errors
     /// If the rows lack a column that an error depends on.
-    pub fn pose_errors(&self, commanded: &Readings) -> Result<Vec<[f64; 6]>, ApplyError> {
+    pub fn pose_errors(&self, commanded: &Readings) -> Result<Vec<[f64; 6]>, Diagnostic> {
         let values = self.errors.along(commanded)?(commanded)?;
         let rows = Rows::of(&values, self.machine.error_slots());
         let mut state = Vec::new();
@@ -160,12 +160,12 @@ impl Correction<'_> {
     ///
     /// # Errors
     /// If the rows lack a column that an error depends on, or the machine has too many axes.
-    pub fn correct(&self, commanded: &Readings) -> Result<Vec<Corrected>, ApplyError> {
+    pub fn correct(&self, commanded: &Readings) -> Result<Vec<Corrected>, Diagnostic> {
         let machine = self.machine;
         let axes = self.aim.axes(machine);
         if axes.len() > MAX_AXES {
             let (name, range) = ("compensation".to_string(), [1.0, MAX_AXES as f64]);
-            return Err(IdentifyError::OutOfRange { name, found: axes.len() as f64, range, unit: "axes" }.into());
+            return Err(error::out_of_range(name, axes.len() as f64, range, "axes"));
         }
         let errors = self.errors.along(commanded)?;
         let linear = Aim::Position.axes(machine);
@@ -228,8 +228,8 @@ impl Correction<'_> {
         commanded: &Readings,
         mut positions: Readings,
         mut rows: Vec<Row>,
-        errors: &dyn Fn(&Readings) -> Result<SlotValues, IdentifyError>,
-    ) -> Result<Vec<Corrected>, ApplyError> {
+        errors: &dyn Fn(&Readings) -> Result<SlotValues, Diagnostic>,
+    ) -> Result<Vec<Corrected>, Diagnostic> {
         let machine = self.machine;
         let failed = |row: &Row| {
             let [mm, rad] = row.remaining;

@@ -8,14 +8,13 @@
 //! increases with each that does not (Levenberg 1944, Marquardt 1963), so that a solution close to the command is found
 //! if there is one, and else the command that leaves least.
 
+use abbe_model::Diagnostic;
 use abbe_model::pose::jacobian::{Inverse, arcs, lever_mm};
 use abbe_model::pose::{Pose, size};
 use abbe_model::sensitivity::SlotValues;
 use abbe_model::session::readings::Readings;
 
 use super::{CONVERGENCE_MM, CONVERGENCE_RAD, Correction, LARGEST_CORRECTION_MM, Row, Rows};
-use crate::ApplyError;
-use abbe_identify::IdentifyError;
 
 /// Maximum number of steps.
 const STEPS: usize = 200;
@@ -47,8 +46,8 @@ pub(super) fn settle(
     commanded: &Readings,
     positions: &mut Readings,
     (rows, numbers): (&mut [Row], &[usize]),
-    errors: &dyn Fn(&Readings) -> Result<SlotValues, IdentifyError>,
-) -> Result<Vec<[f64; 2]>, ApplyError> {
+    errors: &dyn Fn(&Readings) -> Result<SlotValues, Diagnostic>,
+) -> Result<Vec<[f64; 2]>, Diagnostic> {
     let machine = correction.machine;
     let axes = correction.aim.axes(machine);
     let command = |number: usize| axes.iter().map(|axis| commanded.positions[*axis][number]).collect::<Vec<f64>>();

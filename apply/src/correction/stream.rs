@@ -3,8 +3,9 @@
 use std::io::Write;
 
 use abbe_files::commands::{Block, CommandFile, PoseColumns};
-use abbe_identify::IdentifyError;
+use abbe_identify::error;
 use abbe_identify::numerics::parallel;
+use abbe_model::Diagnostic;
 use abbe_model::pose::{Aim, Pose, reach};
 use abbe_model::session::readings::Readings;
 use abbe_model::unit::{ARCSEC_PER_RAD, UM_PER_MM};
@@ -14,7 +15,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Correction, State};
-use crate::ApplyError;
+use crate::error::unrepresentable;
 
 /// Rows of a block.
 const BLOCK_ROWS: usize = 2048;
@@ -96,10 +97,10 @@ pub fn run(
     output: Output,
     start: &[f64],
     to: &mut dyn Write,
-) -> Result<Summary, ApplyError> {
+) -> Result<Summary, Diagnostic> {
     check(correction, file.poses())?;
     if let Some(effect) = correction.errors.with_history() {
-        return Err(ApplyError::unrepresentable(
+        return Err(unrepresentable(
             "the compensation",
             format!("the effect {effect}"),
             "it follows its driver with a lag, which depends on all commands before; save a model in which it follows the \
@@ -108,12 +109,11 @@ pub fn run(
     }
     let layout = Layout::of(correction, file, output);
     if let Some(name) = output.columns().iter().find(|name| file.header().iter().any(|own| own == **name)) {
-        return Err(IdentifyError::not_applicable(
+        return Err(error::not_applicable(
             format!("the commands have a column `{name}`, which the output adds"),
             "the file may be corrected already",
             "remove the column or give it another name",
-        )
-        .into());
+        ));
     }
     write(to, layout.header(file).as_bytes())?;
     let mut summary = Summary { tool_mm: correction.tool_mm, ..Summary::default() };
@@ -150,11 +150,11 @@ pub fn run(
     }
 }
 
-fn write(to: &mut dyn Write, bytes: &[u8]) -> Result<(), ApplyError> {
-    to.write_all(bytes).map_err(|cause| IdentifyError::Write { what: "the output", cause }.into())
+fn write(to: &mut dyn Write, bytes: &[u8]) -> Result<(), Diagnostic> {
+    to.write_all(bytes).map_err(|cause| error::not_written("the output", cause))
 }
 
-fn check(correction: &Correction<'_>, poses: PoseColumns) -> Result<(), ApplyError> {
+fn check(correction: &Correction<'_>, poses: PoseColumns) -> Result<(), Diagnostic> {
     let fits = match correction.aim {
         _ if poses == PoseColumns::None => true,
         Aim::Position => poses == PoseColumns::Point,
@@ -170,7 +170,7 @@ fn check(correction: &Correction<'_>, poses: PoseColumns) -> Result<(), ApplyErr
         Aim::Pose => "px_mm, py_mm, pz_mm and a quaternion, qw, qx, qy, qz",
     };
     let format = "the columns of the commands";
-    Err(ApplyError::unrepresentable(format, "poses of this machine's tool", format!("these are stated by {needs}")))
+    Err(unrepresentable(format, "poses of this machine's tool", format!("these are stated by {needs}")))
 }
 
 /// Replaces the poses of a block by axis positions. Returns whether each row is out of reach; nothing for a file of
@@ -262,7 +262,7 @@ impl Layout {
         file: &CommandFile,
         block: &Block,
         unreachable: &[bool],
-    ) -> Result<(Vec<u8>, Vec<RowResult>), ApplyError> {
+    ) -> Result<(Vec<u8>, Vec<RowResult>), Diagnostic> {
         let errors = correction.pose_errors(&block.rows)?;
         let state_of = |row: usize, state: State| match () {
             () if unreachable.get(row).copied().unwrap_or(false) => State::NotReachable,

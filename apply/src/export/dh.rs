@@ -13,8 +13,9 @@
 //! the calibrated table are those of its lines that lie nearest to the nominal ones (`dh_frames`).
 
 use abbe_files::robot::dh::{Convention, Table};
-use abbe_identify::IdentifyError;
+use abbe_identify::error;
 use abbe_identify::model_file::IdentifiedModel;
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName};
 use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
@@ -25,7 +26,7 @@ use super::dh_frames::{self, Frames};
 use super::dh_nominal;
 use super::entries::best_locations;
 use super::frames::{roll_pitch_yaw, tool_side};
-use crate::ApplyError;
+use crate::error::unrepresentable;
 
 /// One joint.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
@@ -148,11 +149,11 @@ pub fn tables(
     tool_mm: [f64; 3],
     convention: Convention,
     own: Option<&Table>,
-) -> Result<DhTables, ApplyError> {
+) -> Result<DhTables, Diagnostic> {
     let machine = &model.machine;
     let rotary = machine.axes.iter().all(|axis| axis.kind == AxisKind::Rotary);
     if !rotary || machine.workpiece_side > 0 || machine.axes.is_empty() {
-        return Err(ApplyError::unrepresentable(
+        return Err(unrepresentable(
             "a table of Denavit–Hartenberg parameters",
             format!("the machine `{}`", machine.code()),
             "it is that of a chain of rotary axes on the tool side; use URDF",
@@ -165,7 +166,7 @@ pub fn tables(
         Some(table) => of_maker(model, table, convention, design.at_zero().1)?,
         None => dh_nominal::frames(&design),
     };
-    let of_errors = |errors: &[f64]| -> Result<(DhTable, Vec<f64>), ApplyError> {
+    let of_errors = |errors: &[f64]| -> Result<(DhTable, Vec<f64>), Diagnostic> {
         let branch = tool_side(machine, errors, tool_mm)?;
         let (lines, end) = branch.at_zero();
         let found = dh_frames::near(&nominal, &lines, &end);
@@ -228,10 +229,10 @@ fn of_maker(
     table: &Table,
     convention: Convention,
     end: Isometry3<f64>,
-) -> Result<Frames, ApplyError> {
+) -> Result<Frames, Diagnostic> {
     let refused = |difference: String| {
         let (one, other) = ("the table".to_string(), "the model's machine".to_string());
-        Err(IdentifyError::Unlike { one, relation: "that of", other, difference }.into())
+        Err(error::unlike(one, "that of", other, difference))
     };
     if table.convention != convention {
         return refused("its convention is another".into());

@@ -13,6 +13,7 @@
 //! error. Gauss and Newton's iteration starts at the plain displacements, the location errors themselves, and leaves
 //! there what the travel does not determine.
 
+use abbe_model::Diagnostic;
 use abbe_model::chain::ERRORS_PER_AXIS;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::driver::Driver;
@@ -26,7 +27,6 @@ use serde::Serialize;
 
 use super::frames::location_errors;
 use super::travel::Travel;
-use crate::ApplyError;
 use crate::compare::workspace::point_by;
 use crate::correction::Correction;
 use crate::volumetric::Size;
@@ -116,7 +116,7 @@ fn follows_position(effect: &Effect) -> bool {
 ///
 /// # Errors
 /// If an error of the model cannot be evaluated there.
-pub fn best_locations(model: &IdentifiedModel, tool_mm: [f64; 3]) -> Result<(Vec<f64>, Option<Remaining>), ApplyError> {
+pub fn best_locations(model: &IdentifiedModel, tool_mm: [f64; 3]) -> Result<(Vec<f64>, Option<Remaining>), Diagnostic> {
     let mut errors = location_errors(model);
     let estimated = |name: &ErrorName| model.machine.error_slot(name).filter(|_| name.kind == ErrorKind::Location);
     let of_errors = model.parameters.iter().filter(|parameter| parameter.role == Role::Error && !parameter.held);
@@ -152,7 +152,7 @@ impl<'m> Lines<'m> {
         slots: Vec<usize>,
         travel: &Travel,
         tool_mm: [f64; 3],
-    ) -> Result<Lines<'m>, ApplyError> {
+    ) -> Result<Lines<'m>, Diagnostic> {
         let (grid, weights) = travel.grid(model);
         let mut errors = EstimatedErrors::of_model(model, tool_mm, model.table_mm);
         errors.effects.retain(|estimated| follows_position(&estimated.effect));
@@ -298,7 +298,7 @@ impl<'m> Lines<'m> {
     ///
     /// # Errors
     /// If an error of the model cannot be evaluated over the travel.
-    pub fn by_parameter(&self, free: &[bool]) -> Result<(Vec<(usize, DVector<f64>)>, Vec<NotRepresented>), ApplyError> {
+    pub fn by_parameter(&self, free: &[bool]) -> Result<(Vec<(usize, DVector<f64>)>, Vec<NotRepresented>), Diagnostic> {
         let model = self.model;
         let states = States { readings: self.grid.clone(), tool_mm: self.tool_mm, table_mm: model.table_mm };
         let carried = model.carried_parameters();

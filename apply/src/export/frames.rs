@@ -7,14 +7,16 @@
 //!
 //! `X_k` is the pose of joint `k` in the frame of the joint before it, from the bed outwards on either side.
 
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{ERRORS_PER_AXIS, Machine};
 use abbe_model::frames::Rotation;
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-use crate::ApplyError;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::parameters::Role;
+
+use crate::error::unrepresentable;
 
 /// A joint with its pose in the frame of the joint before it.
 #[derive(Clone, Debug)]
@@ -52,7 +54,7 @@ pub fn location_errors(model: &IdentifiedModel) -> Vec<f64> {
 ///
 /// # Errors
 /// If the machine's error angles are small-angle matrices, which are no rotations.
-pub fn tool_side(machine: &Machine, errors: &[f64], point_mm: [f64; 3]) -> Result<Branch, ApplyError> {
+pub fn tool_side(machine: &Machine, errors: &[f64], point_mm: [f64; 3]) -> Result<Branch, Diagnostic> {
     branch(machine, errors, (machine.workpiece_side..machine.axes.len()).collect(), point_mm)
 }
 
@@ -60,13 +62,13 @@ pub fn tool_side(machine: &Machine, errors: &[f64], point_mm: [f64; 3]) -> Resul
 ///
 /// # Errors
 /// As [`tool_side`].
-pub fn workpiece_side(machine: &Machine, errors: &[f64], point_mm: [f64; 3]) -> Result<Branch, ApplyError> {
+pub fn workpiece_side(machine: &Machine, errors: &[f64], point_mm: [f64; 3]) -> Result<Branch, Diagnostic> {
     branch(machine, errors, (0..machine.workpiece_side).rev().collect(), point_mm)
 }
 
-fn branch(machine: &Machine, errors: &[f64], axes: Vec<usize>, point_mm: [f64; 3]) -> Result<Branch, ApplyError> {
+fn branch(machine: &Machine, errors: &[f64], axes: Vec<usize>, point_mm: [f64; 3]) -> Result<Branch, Diagnostic> {
     if machine.rotation != Rotation::Exact {
-        return Err(ApplyError::unrepresentable(
+        return Err(unrepresentable(
             "a description of the chain",
             "`rotation = \"small-angle\"` of the machine",
             "it needs rotations, and these matrices are none; identify the model with `rotation = \"exact\"`",

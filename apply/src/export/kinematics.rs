@@ -12,6 +12,7 @@
 //! The plain entries are these displacements. The best entries are those that make the volumetric error of the machine
 //! with all its errors least over a travel ([`super::entries`]). What the control's model cannot express is listed.
 
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
@@ -21,8 +22,8 @@ use serde::Serialize;
 
 use super::entries::{Lines, NotRepresented, Remaining};
 use super::travel::Travel;
-use crate::ApplyError;
 use crate::compare::workspace::AxisRange;
+use crate::error::unrepresentable;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::parameters::Role;
 
@@ -140,10 +141,10 @@ pub fn table(
     choice: EntryChoice,
     travel: &Travel,
     tool_mm: [f64; 3],
-) -> Result<KinematicTable, ApplyError> {
+) -> Result<KinematicTable, Diagnostic> {
     let control = format!("{name}, {}", kinematics.about);
     let (first, second) = tilting_table(&model.machine).ok_or_else(|| {
-        ApplyError::unrepresentable(
+        unrepresentable(
             &control,
             format!("the machine `{}`", model.machine.code()),
             "it describes two rotary axes under the workpiece, a tilting A (along X) or B (along Y) with C (along Z) on it",
@@ -169,7 +170,7 @@ pub fn table(
     let free = known.each_ref().map(|known| !known.is_empty());
     if !free.contains(&true) {
         let holds = "it has no entry for an error that the readings of the model determine";
-        return Err(ApplyError::unrepresentable(control, "the model", holds));
+        return Err(unrepresentable(control, "the model", holds));
     }
     let slots: Vec<usize> = names.iter().filter_map(|names| model.machine.error_slot(&names[0])).collect();
     let plain = known.each_ref().map(|known| known.iter().map(|k| model.parameters[*k].value).sum::<f64>());

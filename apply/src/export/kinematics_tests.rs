@@ -1,5 +1,6 @@
 //! Tables of controls, by kinematics of the controls and rigid bodies that know nothing of their writer.
 
+use abbe_model::Diagnostic;
 use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::frames::Point;
 use nalgebra::{Rotation3, Vector3};
@@ -9,7 +10,6 @@ use super::frames::location_errors;
 use super::kinematics::{EntryChoice, KinematicTable};
 use super::tests::{model, random_errors, robot};
 use super::travel::Travel;
-use crate::ApplyError;
 use crate::control::control;
 use abbe_identify::model_file::IdentifiedModel;
 
@@ -31,7 +31,7 @@ fn change(table: &KinematicTable, field: &str) -> f64 {
 }
 
 /// The table of a control for a travel of ±90°, ±180° and ±150 mm.
-fn entries_of(model: &IdentifiedModel, word: &str, choice: EntryChoice) -> Result<KinematicTable, ApplyError> {
+fn entries_of(model: &IdentifiedModel, word: &str, choice: EntryChoice) -> Result<KinematicTable, Diagnostic> {
     let range = |axis: &abbe_model::axis::Axis| match (axis.kind, axis.direction[2].abs() == 1.0) {
         (abbe_model::axis::AxisKind::Linear, _) => [-150.0, 150.0],
         (_, true) => [-std::f64::consts::PI, std::f64::consts::PI],

@@ -5,6 +5,7 @@
 //! nearest to the nominal point, so that its change is across the axis.
 
 use abbe_identify::model_file::IdentifiedModel;
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName};
@@ -13,7 +14,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::frames::{location_errors, tool_side, workpiece_side};
-use crate::ApplyError;
 
 /// The place of an axis.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -53,11 +53,11 @@ const UNDETERMINED: f64 = 1e-7;
 ///
 /// # Errors
 /// If the machine's error angles are small-angle matrices.
-pub fn places(model: &IdentifiedModel) -> Result<Vec<AxisPlace>, ApplyError> {
+pub fn places(model: &IdentifiedModel) -> Result<Vec<AxisPlace>, Diagnostic> {
     let machine = &model.machine;
     let errors = location_errors(model);
     let nominal = lines(machine, &vec![0.0; machine.error_slots()])?;
-    let coordinates = |errors: &[f64]| -> Result<Vec<f64>, ApplyError> {
+    let coordinates = |errors: &[f64]| -> Result<Vec<f64>, Diagnostic> {
         let lines = lines(machine, errors)?;
         Ok(lines.iter().zip(&nominal).flat_map(|(line, nominal)| six(line, nominal)).collect())
     };
@@ -109,7 +109,7 @@ pub fn places(model: &IdentifiedModel) -> Result<Vec<AxisPlace>, ApplyError> {
 type AxisLine = (Vector3<f64>, Vector3<f64>);
 
 /// The lines of the axes in R with all axes at zero, in the order of the chain.
-fn lines(machine: &Machine, errors: &[f64]) -> Result<Vec<AxisLine>, ApplyError> {
+fn lines(machine: &Machine, errors: &[f64]) -> Result<Vec<AxisLine>, Diagnostic> {
     let mut found = vec![(Vector3::zeros(), Vector3::z()); machine.axes.len()];
     for branch in [workpiece_side(machine, errors, [0.0; 3])?, tool_side(machine, errors, [0.0; 3])?] {
         for (joint, line) in branch.joints.iter().zip(branch.at_zero().0) {

@@ -1,12 +1,12 @@
 //! The travel over which the entries of a control are judged: a grid of axis positions with weights.
 
+use abbe_identify::error;
+use abbe_model::Diagnostic;
 use abbe_model::driver::Driver;
 use abbe_model::session::limits::MAX_LENGTH_MM;
 use abbe_model::session::readings::Readings;
 
-use crate::ApplyError;
 use crate::compare::workspace::AxisRange;
-use abbe_identify::IdentifyError;
 use abbe_identify::model_file::IdentifiedModel;
 
 /// Places along a rotary axis, odd.
@@ -42,18 +42,18 @@ impl Travel {
     ///
     /// # Errors
     /// If there is no such axis, or the range is none.
-    pub fn with(mut self, model: &IdentifiedModel, name: &str, [from, to]: [f64; 2]) -> Result<Travel, ApplyError> {
+    pub fn with(mut self, model: &IdentifiedModel, name: &str, [from, to]: [f64; 2]) -> Result<Travel, Diagnostic> {
         let axes = &model.machine.axes;
-        let no_axis = || IdentifyError::no_axis(&model.machine, "", name);
+        let no_axis = || error::no_axis(&model.machine, "", name);
         let index = model.machine.axis_index(name).ok_or_else(no_axis)?;
         let range = [-MAX_LENGTH_MM, MAX_LENGTH_MM];
         let axis = || format!("axis `{name}`");
         if let Some(found) = [from, to].into_iter().find(|found| !(range[0]..=range[1]).contains(found)) {
-            return Err(IdentifyError::OutOfRange { name: axis(), found, range, unit: "mm or degrees" }.into());
+            return Err(error::out_of_range(axis(), found, range, "mm or degrees"));
         }
         if from >= to {
             let found = "the first number is not below the second";
-            return Err(IdentifyError::not_applicable(axis(), found, "state the lower end first").into());
+            return Err(error::not_applicable(axis(), found, "state the lower end first"));
         }
         self.ranges[index] = [from, to].map(|value| axes[index].kind.to_internal(value));
         self.is_measured = false;

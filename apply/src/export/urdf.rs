@@ -7,6 +7,7 @@
 
 use std::fmt::Write;
 
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::unit::Unit;
@@ -15,7 +16,6 @@ use nalgebra::Isometry3;
 use super::entries::best_locations;
 use super::frames::{Branch, roll_pitch_yaw, tool_side, workpiece_side};
 use super::left_out;
-use crate::ApplyError;
 use abbe_identify::model_file::IdentifiedModel;
 
 /// Mass and inertia of a link. URDF has no place for a link without them in simulators of dynamics.
@@ -25,7 +25,7 @@ const MASS_KG: f64 = 1.0;
 ///
 /// # Errors
 /// If the machine's error angles are small-angle matrices.
-pub fn urdf(model: &IdentifiedModel, tool_mm: [f64; 3]) -> Result<String, ApplyError> {
+pub fn urdf(model: &IdentifiedModel, tool_mm: [f64; 3]) -> Result<String, Diagnostic> {
     let machine = &model.machine;
     let (errors, remaining) = best_locations(model, tool_mm)?;
     let mut text = String::from("<?xml version=\"1.0\"?>\n");

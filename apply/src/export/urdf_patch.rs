@@ -7,15 +7,15 @@
 use abbe_files::Source;
 use abbe_files::robot::chain::Chain;
 use abbe_files::robot::urdf::{self, UrdfJoint};
-use abbe_identify::IdentifyError;
+use abbe_identify::error;
 use abbe_identify::model_file::IdentifiedModel;
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::unit::Unit;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::entries::best_locations;
 use super::frames::{JointFrame, roll_pitch_yaw, tool_side};
-use crate::ApplyError;
 
 /// Largest distance between an axis of the file and of the model's machine, mm; and of their directions.
 const SAME_MM: f64 = 1e-3;
@@ -27,7 +27,7 @@ const UNCHANGED: f64 = 1e-12;
 ///
 /// # Errors
 /// If the file is no URDF, or its chain is not that of the model's machine.
-pub fn patched(model: &IdentifiedModel, source: &Source, tip: Option<&str>) -> Result<String, ApplyError> {
+pub fn patched(model: &IdentifiedModel, source: &Source, tip: Option<&str>) -> Result<String, Diagnostic> {
     let file = urdf::read(source)?;
     let (path, _) = file.path(&source.file, tip)?;
     let chain = file.chain(&source.file, tip)?;
@@ -84,11 +84,11 @@ fn tilt(own: &JointFrame, kind: AxisKind, pose: &Isometry3<f64>, direction: &Vec
 }
 
 /// Refuses a file whose chain is not the machine of the model.
-fn refuse_another(model: &IdentifiedModel, chain: &Chain) -> Result<(), ApplyError> {
+fn refuse_another(model: &IdentifiedModel, chain: &Chain) -> Result<(), Diagnostic> {
     let machine = &model.machine;
     let refused = |difference: String| {
         let (one, other) = ("the model".to_string(), "the robot in the file".to_string());
-        Err(IdentifyError::Unlike { one, relation: "of", other, difference }.into())
+        Err(error::unlike(one, "of", other, difference))
     };
     if machine.workpiece_side > 0 || machine.axes.len() != chain.joints.len() {
         return refused(format!(

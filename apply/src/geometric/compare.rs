@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
+use abbe_identify::error;
+use abbe_model::Diagnostic;
 use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::Session;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Estimate, Estimator, Method};
-use crate::ApplyError;
-use abbe_identify::IdentifyError;
 use abbe_identify::fit::{self, Fit};
 use abbe_identify::noise::ReadingNoise;
 use abbe_identify::parameters::Role;
@@ -106,10 +106,10 @@ pub struct Comparison {
 ///
 /// # Errors
 /// See [`Estimator::new`] and [`fit::prepare`].
-pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Comparison, ApplyError> {
+pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Comparison, Diagnostic> {
     if let Some(other) = session.tests.iter().find(|test| test.station.bar().is_none()) {
         let (found, expected) = (other.station.kind(), InstrumentKind::BallBar);
-        return Err(IdentifyError::OtherInstrument { method: "the methods of circles", found, expected }.into());
+        return Err(error::other_instrument("the methods of circles", found, expected));
     }
     let (problem, full) = fit::prepare(session, seed)?;
     let estimator = Estimator::new(&problem, method)?;
@@ -201,7 +201,7 @@ fn readings(problem: &Problem, beta: &[f64]) -> Vec<Vec<f64>> {
 }
 
 /// The parameters of the full fit to other readings of the same tests.
-fn refitted(problem: &Problem, readings: &[Vec<f64>], full: &Fit) -> Result<Vec<f64>, ApplyError> {
+fn refitted(problem: &Problem, readings: &[Vec<f64>], full: &Fit) -> Result<Vec<f64>, Diagnostic> {
     let mut session = Session::clone(&problem.session);
     let mut remaining = readings.iter();
     for test in &mut session.tests {

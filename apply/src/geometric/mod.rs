@@ -16,14 +16,14 @@
 mod centre;
 mod compare;
 
+use abbe_identify::error;
+use abbe_model::Diagnostic;
 use abbe_model::component::ErrorName;
 use faer::Mat;
 
 pub use centre::{Centre, CircleGeometry};
 pub use compare::{CentreResult, Comparison, ComparisonRow, compare};
 
-use crate::ApplyError;
-use abbe_identify::IdentifyError;
 use abbe_identify::numerics::solve::Svd;
 use abbe_identify::numerics::tolerances::COLLINEAR;
 use abbe_identify::parameters::Role;
@@ -93,11 +93,10 @@ impl Estimator {
     ///
     /// # Errors
     /// If the session lacks tests for the method, or the errors are not identifiable from them.
-    pub fn new(problem: &Problem, method: Method) -> Result<Estimator, ApplyError> {
+    pub fn new(problem: &Problem, method: Method) -> Result<Estimator, Diagnostic> {
         let machine = &problem.session.machine;
-        let refuse = |found: String, expected: &str| {
-            IdentifyError::not_applicable(format!("method {}", method.word()), found, expected).into()
-        };
+        let refuse =
+            |found: String, expected: &str| error::not_applicable(format!("method {}", method.word()), found, expected);
         let mut circles = Vec::new();
         let mut refused = Vec::new();
         for (test, model) in problem.models.iter().enumerate() {
@@ -143,11 +142,11 @@ impl Estimator {
     ///
     /// # Errors
     /// If the readings of a test do not lie on a circle.
-    pub fn estimate(&self, problem: &Problem, observed: &[&[f64]]) -> Result<Estimate, ApplyError> {
+    pub fn estimate(&self, problem: &Problem, observed: &[&[f64]]) -> Result<Estimate, Diagnostic> {
         let mut centres = Vec::new();
         for (test, geometry) in self.tests.iter().zip(&self.geometries) {
             let name = &problem.tests[*test].name;
-            let refused = |why| IdentifyError::not_applicable(format!("test \"{name}\""), why, NEEDS);
+            let refused = |why| error::not_applicable(format!("test \"{name}\""), why, NEEDS);
             centres.push(geometry.centre(observed[*test], &problem.rejected[*test]).map_err(refused)?);
         }
         let offsets: Vec<f64> = centres.iter().flat_map(|centre| centre.offset_mm).collect();
@@ -212,14 +211,14 @@ fn errors(problem: &Problem, method: Method, geometries: &[CircleGeometry]) -> V
 }
 
 /// `S` at the nominal machine.
-fn sensitivities(problem: &Problem, tests: &[usize], geometries: &[CircleGeometry]) -> Result<Mat<f64>, ApplyError> {
+fn sensitivities(problem: &Problem, tests: &[usize], geometries: &[CircleGeometry]) -> Result<Mat<f64>, Diagnostic> {
     let parameters = problem.parameters.list.len();
     let nominal = problem.slot_values(&vec![0.0; parameters]);
     let mut sensitivities = Mat::zeros(2 * tests.len(), parameters);
     for (k, (test, geometry)) in tests.iter().zip(geometries).enumerate() {
         let lengths = problem.models[*test].readings(&nominal[*test]);
         let name = &problem.tests[*test].name;
-        let refused = |why| IdentifyError::not_applicable(format!("test \"{name}\", nominally"), why, NEEDS);
+        let refused = |why| error::not_applicable(format!("test \"{name}\", nominally"), why, NEEDS);
         let centre = geometry.centre(&lengths, &problem.rejected[*test]).map_err(refused)?;
         let block = RowBlock { test: *test, rows: 0..problem.models[*test].rows() };
         let rows = problem.rows(&nominal, &block)?;

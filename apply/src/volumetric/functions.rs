@@ -6,6 +6,7 @@ use std::path::Path;
 use abbe_files::Source;
 use abbe_files::read::lowered;
 use abbe_identify::quantity::Given;
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{ERRORS_PER_AXIS, Machine};
 use abbe_model::component::{ErrorKind, ErrorName};
@@ -14,8 +15,6 @@ use abbe_model::document::value::{Long, Positive};
 use abbe_model::unit::Unit;
 use schemars::JsonSchema;
 use serde::Deserialize;
-
-use crate::ApplyError;
 
 /// The form of an error function; values in mm or rad.
 #[derive(Clone, Debug, PartialEq)]
@@ -188,7 +187,7 @@ struct Harmonic {
 /// # Errors
 /// If the file cannot be read, is not of this form, holds a number beyond the limits of input, or names something that
 /// the machine lacks. The message names the file and the line.
-pub fn read(path: &Path, machine: &Machine) -> Result<Vec<ErrorFunction>, ApplyError> {
+pub fn read(path: &Path, machine: &Machine) -> Result<Vec<ErrorFunction>, Diagnostic> {
     of_source(&abbe_files::text(path, "the file of error functions")?, machine)
 }
 
@@ -196,7 +195,7 @@ pub fn read(path: &Path, machine: &Machine) -> Result<Vec<ErrorFunction>, ApplyE
 ///
 /// # Errors
 /// As [`read`].
-pub fn of_source(source: &Source, machine: &Machine) -> Result<Vec<ErrorFunction>, ApplyError> {
+pub fn of_source(source: &Source, machine: &Machine) -> Result<Vec<ErrorFunction>, Diagnostic> {
     Ok(lowered(source, |file: &File| {
         let mut functions = Vec::new();
         for (id, quantity) in &file.constant.0 {

@@ -10,6 +10,8 @@
 pub mod functions;
 mod results;
 
+use abbe_identify::error;
+use abbe_model::Diagnostic;
 use abbe_model::chain::{BodyErrors, ERRORS_PER_AXIS, Machine};
 use abbe_model::frames::Point;
 use abbe_model::sensitivity::SlotValues;
@@ -20,9 +22,7 @@ use nalgebra::Vector3;
 pub use functions::{ErrorFunction, Form};
 pub use results::{AxisShare, Coordinates, MapPosition, Size, Summary};
 
-use crate::ApplyError;
 use crate::correction::{Correction, State};
-use abbe_identify::IdentifyError;
 use abbe_identify::model_file::errors::ErrorsNear;
 use abbe_identify::model_file::errors::MachineErrors;
 use abbe_identify::numerics::parallel;
@@ -112,7 +112,7 @@ impl MachineWithErrors<'_> {
     ///
     /// # Errors
     /// If the linear axes do not span the space, or the errors are too large.
-    pub fn compensate(&self, positions: &[f64]) -> Result<Compensated, ApplyError> {
+    pub fn compensate(&self, positions: &[f64]) -> Result<Compensated, Diagnostic> {
         let correction = Correction { machine: self.machine, errors: self, tool_mm: self.tool_mm, aim: Aim::Position };
         let columns = positions.iter().map(|position| vec![*position]).collect();
         let commanded = Readings { positions: columns, channels: 1, ..Readings::default() };
@@ -124,17 +124,15 @@ impl MachineWithErrors<'_> {
             }
             Some((_, condition, _)) if condition.is_infinite() => {
                 let found = format!("{} linear axes of the machine", Aim::Position.axes(self.machine).len());
-                Err(IdentifyError::not_applicable("compensation", found, "they do not span the space").into())
+                Err(error::not_applicable("compensation", found, "they do not span the space"))
             }
-            _ => {
-                Err(IdentifyError::not_applicable("compensation", "no convergence", "the errors are too large").into())
-            }
+            _ => Err(error::not_applicable("compensation", "no convergence", "the errors are too large")),
         }
     }
 }
 
 impl MachineErrors for MachineWithErrors<'_> {
-    fn along<'a>(&'a self, _: &'a Readings) -> Result<ErrorsNear<'a>, IdentifyError> {
+    fn along<'a>(&'a self, _: &'a Readings) -> Result<ErrorsNear<'a>, Diagnostic> {
         Ok(Box::new(|positions| {
             let mut values = SlotValues::zero(self.machine.error_slots());
             for function in self.functions {
@@ -157,12 +155,12 @@ pub fn map(
     machine_with_errors: &MachineWithErrors<'_>,
     grid: &[Vec<f64>],
     compensate: bool,
-) -> Result<(Vec<VolumetricPoint>, Summary), ApplyError> {
+) -> Result<(Vec<VolumetricPoint>, Summary), Diagnostic> {
     let total = grid.iter().try_fold(1_usize, |total, axis| total.checked_mul(axis.len()));
     let Some(total) = total.filter(|total| *total > 0 && *total <= MAX_POINTS) else {
         let found = grid.iter().map(|axis| axis.len() as f64).product();
         let (name, range) = ("a map".to_string(), [1.0, MAX_POINTS as f64]);
-        return Err(IdentifyError::OutOfRange { name, found, range, unit: "points" }.into());
+        return Err(error::out_of_range(name, found, range, "points"));
     };
     let points = parallel::map(total, &|number| {
         let mut rest = number;
@@ -175,9 +173,7 @@ pub fn map(
         if !point.error_mm.iter().all(|error| error.abs() <= LARGEST) {
             let (error, place) = (norm(point.error_mm), machine_with_errors.position_text(&positions));
             let found = format!("the errors displace the tool by {error:.2e} mm at {place}");
-            return Err(
-                IdentifyError::not_applicable("a map", found, "polynomials grow fast beyond their scale").into()
-            );
+            return Err(error::not_applicable("a map", found, "polynomials grow fast beyond their scale"));
         }
         if compensate {
             point.compensated = Some(machine_with_errors.compensate(&positions)?);
@@ -186,7 +182,7 @@ pub fn map(
         Ok((point, by_axis))
     });
     // With several failures, the first one in grid order is reported.
-    let points: Vec<(VolumetricPoint, Vec<f64>)> = points.into_iter().collect::<Result<_, ApplyError>>()?;
+    let points: Vec<(VolumetricPoint, Vec<f64>)> = points.into_iter().collect::<Result<_, Diagnostic>>()?;
     let machine = machine_with_errors.machine;
     let largest = points.iter().max_by(|(a, _), (b, _)| norm(a.error_mm).total_cmp(&norm(b.error_mm)));
     let residual = compensate.then(|| {

@@ -1,8 +1,9 @@
 //! Parameters that an equation does not contain.
 
+use abbe_model::Diagnostic;
+
 use crate::check::agreement::Agreement;
 use crate::equation::Equation;
-use crate::error::CodegenError;
 use crate::form::Kind;
 use crate::normal_form::Ring;
 use crate::symbol::VariableId;
@@ -10,7 +11,7 @@ use crate::variable::Variable;
 
 /// The parameters that the outputs do not contain. A derivative that is not zero at some point proves that its
 /// parameter is contained; otherwise the normal form decides.
-pub(crate) fn absent_parameters(equation: &Equation, agreement: &Agreement) -> Result<Vec<Variable>, CodegenError> {
+pub(crate) fn absent_parameters(equation: &Equation, agreement: &Agreement) -> Result<Vec<Variable>, Diagnostic> {
     let rounding = 1e-9;
     let derivatives = equation.parameters.iter().zip(&agreement.largest_derivatives);
     let unseen = derivatives.filter(|(_, largest)| **largest < rounding);

@@ -1,9 +1,10 @@
 //! Agreement of the programs of an equation with the chain over dual numbers, at points with large errors.
 
+use abbe_model::Diagnostic;
+
 use crate::check::points::{CheckPoint, PseudoRandom, draw_anywhere, worst};
 use crate::check::reference::expected;
 use crate::equation::Equation;
-use crate::error::CodegenError;
 use crate::program::Program;
 use crate::subject::Source;
 use crate::variable::Variable;
@@ -45,7 +46,7 @@ pub(crate) fn agreement(
     equation: &Equation,
     source: &impl Source,
     programs: &[&Program],
-) -> Result<Agreement, CodegenError> {
+) -> Result<Agreement, Diagnostic> {
     let mut draws = PseudoRandom::new(4);
     let mut agreement = Agreement::default();
     let count = equation.parameters.len();
@@ -90,11 +91,11 @@ pub(crate) fn agreement(
     let relative = differences.iter().zip(&scales).map(|(d, s)| d / s.max(1.0));
     agreement.gradient = relative.fold(0.0, f64::max);
     if agreement.points == 0 || agreement.largest() > TOLERANCE {
-        return Err(CodegenError::Unconfirmed {
-            points: agreement.points,
-            value: agreement.value,
-            gradient: agreement.gradient,
-        });
+        return Err(Diagnostic::equation(format!(
+            "the equation is not written: over {} points it differs from the chain with dual numbers by {:.1e} (value) and \
+             {:.1e} (derivatives), relative; the limit is 1e-12",
+            agreement.points, agreement.value, agreement.gradient
+        )));
     }
     agreement.largest_derivatives = scales;
     Ok(agreement)

@@ -1,10 +1,10 @@
 //! Truncation error of first-order, bilinear and small-angle forms against the exact chain.
 
+use abbe_model::Diagnostic;
 use abbe_model::frames::Rotation;
 
 use crate::check::points::{CheckPoint, PseudoRandom, worst};
 use crate::equation::Equation;
-use crate::error::CodegenError;
 use crate::form::Order;
 use crate::program::Program;
 use crate::run::Run;
@@ -30,7 +30,7 @@ pub(crate) fn deviations(
     source: &impl Source,
     range: &[(Variable, [f64; 2])],
     program: &Program,
-) -> Result<Vec<Deviation>, CodegenError> {
+) -> Result<Vec<Deviation>, Diagnostic> {
     if equation.options.order == Order::Exact && equation.machine.rotation == Rotation::Exact {
         return Ok(Vec::new());
     }

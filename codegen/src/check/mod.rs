@@ -9,8 +9,9 @@ mod reference;
 pub use agreement::Agreement;
 pub use deviation::Deviation;
 
+use abbe_model::Diagnostic;
+
 use crate::equation::Equation;
-use crate::error::CodegenError;
 use crate::subject::Source;
 use crate::variable::Variable;
 
@@ -35,7 +36,7 @@ pub struct Checked<'e> {
 ///
 /// # Errors
 /// If they disagree, if an effect has no value at a point, or if a normal form is needed and does not exist.
-pub fn check<'e>(equation: &'e Equation, source: &impl Source) -> Result<Checked<'e>, CodegenError> {
+pub fn check<'e>(equation: &'e Equation, source: &impl Source) -> Result<Checked<'e>, Diagnostic> {
     let value = equation.program(false);
     let agreement = agreement::agreement(equation, source, &[&value, &equation.program(true)])?;
     let absent = absent::absent_parameters(equation, &agreement)?;

@@ -1,10 +1,10 @@
 //! Reference value and derivatives of a form, from the chain over dual numbers.
 
+use abbe_model::Diagnostic;
 use num_dual::{Derivative, Dual64, DualNum, DualSVec64, HyperDual64};
 
 use crate::check::points::CheckPoint;
 use crate::equation::Equation;
-use crate::error::CodegenError;
 use crate::form::Order;
 use crate::run::Run;
 use crate::subject::Source;
@@ -23,7 +23,7 @@ fn run<S>(
     source: &impl Source,
     point: &CheckPoint,
     small: impl Fn(usize) -> S,
-) -> Result<(Vec<S>, Vec<S>), CodegenError>
+) -> Result<(Vec<S>, Vec<S>), Diagnostic>
 where
     S: DualNum<Primitive = f64> + Copy,
 {
@@ -46,7 +46,7 @@ pub(crate) fn expected(
     equation: &Equation,
     source: &impl Source,
     point: &CheckPoint,
-) -> Result<ValueAndGradient, CodegenError> {
+) -> Result<ValueAndGradient, Diagnostic> {
     match equation.options.order {
         Order::Exact => by_duals(equation, source, point, &point.small),
         Order::First => {
@@ -68,7 +68,7 @@ fn by_duals(
     source: &impl Source,
     point: &CheckPoint,
     at: &[f64],
-) -> Result<ValueAndGradient, CodegenError> {
+) -> Result<ValueAndGradient, Diagnostic> {
     let values = run(equation, source, point, |i| at[i])?.0;
     let mut gradient = vec![vec![0.0; at.len()]; values.len()];
     for start in (0..at.len()).step_by(PACK) {
@@ -96,7 +96,7 @@ fn expected_bilinear(
     equation: &Equation,
     source: &impl Source,
     point: &CheckPoint,
-) -> Result<ValueAndGradient, CodegenError> {
+) -> Result<ValueAndGradient, Diagnostic> {
     let count = equation.parameters.len();
     let mut base = Vec::new();
     let mut slopes: Vec<Vec<f64>> = Vec::new();
@@ -149,7 +149,7 @@ fn reading_of_groups(
     point: &CheckPoint,
     groups: &[Dual64],
     small: &impl Fn(usize) -> Dual64,
-) -> Result<Vec<Dual64>, CodegenError> {
+) -> Result<Vec<Dual64>, Diagnostic> {
     let nominal = |variable: Variable| point.nominal(&variable);
     let run = Run::<Dual64>::new(&equation.machine, source, &equation.parameters, &nominal, small)?;
     let reading = run.reading_of_groups(groups);

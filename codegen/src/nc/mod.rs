@@ -21,16 +21,17 @@ pub mod options;
 mod path;
 pub mod program;
 
+use abbe_model::Diagnostic;
 use abbe_model::chain::Machine;
 use abbe_model::session::motion::Motion;
 use abbe_model::session::moves::Moves;
 use abbe_model::session::{Session, Test};
 use abbe_model::words::listed;
 
+use crate::error;
+
 pub use options::NcOptions;
 pub use program::Program;
-
-use crate::error::CodegenError;
 
 /// A control that programs are written for.
 pub trait Control: Sync {
@@ -78,13 +79,10 @@ pub static CONTROLS: [&dyn Control; 4] = [&iso::LINUXCNC, &iso::FANUC, &iso::SIE
 ///
 /// # Errors
 /// If there is none.
-pub fn control(word: &str) -> Result<&'static dyn Control, CodegenError> {
+pub fn control(word: &str) -> Result<&'static dyn Control, Diagnostic> {
     CONTROLS.into_iter().find(|control| control.word() == word).ok_or_else(|| {
         let known: Vec<&str> = CONTROLS.iter().map(|control| control.word()).collect();
-        CodegenError::Nc {
-            message: format!("no control is called `{word}`"),
-            help: format!("the controls are {}", known.join(", ")),
-        }
+        error::nc(format!("no control is called `{word}`"), format!("the controls are {}", known.join(", ")))
     })
 }
 
@@ -149,7 +147,7 @@ fn states_motion(test: &Test) -> bool {
 /// # Errors
 /// If a test has neither a motion nor readings, no test has a motion, an axis has no letter, an axis would leave its
 /// travel, or the control lacks what the options ask for.
-pub fn files(session: &Session, control: &dyn Control, options: &NcOptions) -> Result<NcFiles, CodegenError> {
+pub fn files(session: &Session, control: &dyn Control, options: &NcOptions) -> Result<NcFiles, Diagnostic> {
     options.check(control, session.tests.len())?;
     let (mut files, mut warnings, mut moves, mut runs) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut calls: Vec<(String, String)> = Vec::new();

@@ -1,9 +1,10 @@
 //! What the user may choose of NC programs.
 
+use abbe_model::Diagnostic;
 use abbe_model::words::number;
 
 use super::Control;
-use crate::error::CodegenError;
+use crate::error;
 
 /// The number of `main` unless another is asked for.
 const FIRST_NUMBER: u32 = 1000;
@@ -65,15 +66,15 @@ impl NcOptions {
         self.increment_mm.map_or(control.decimals(), |increment| (-increment.log10()).round().max(0.0) as usize)
     }
 
-    pub(super) fn check(&self, control: &dyn Control, tests: usize) -> Result<(), CodegenError> {
+    pub(super) fn check(&self, control: &dyn Control, tests: usize) -> Result<(), Diagnostic> {
         let fault = |what: &str, value: f64, least: f64, most: f64| {
             if value >= least && value <= most {
                 return Ok(());
             }
-            Err(CodegenError::Nc {
-                message: format!("{what} is {}", number(value)),
-                help: format!("a value from {} to {} is expected", number(least), number(most)),
-            })
+            Err(error::nc(
+                format!("{what} is {}", number(value)),
+                format!("a value from {} to {} is expected", number(least), number(most)),
+            ))
         };
         fault("the overshoot in degrees", self.overshoot_deg.unwrap_or(0.0), 0.0, 360.0)?;
         fault("the overshoot in mm", self.overshoot_mm.unwrap_or(0.0), 0.0, 1e3)?;
@@ -85,35 +86,30 @@ impl NcOptions {
         if let Some(increment) = self.increment_mm {
             let power = 0.1_f64.powi(self.decimals(control) as i32);
             if !(1e-6..=0.01).contains(&increment) || (increment - power).abs() > 1e-9 * power {
-                return Err(CodegenError::Nc {
-                    message: format!("the increment in mm is {increment}"),
-                    help: "0.01, 0.001, 0.0001, 0.00001 or 0.000001 is expected".into(),
-                });
+                return Err(error::nc(
+                    format!("the increment in mm is {increment}"),
+                    "0.01, 0.001, 0.0001, 0.00001 or 0.000001 is expected",
+                ));
             }
         }
         if self.number.is_some() && !control.has_numbers() {
-            return Err(CodegenError::Nc {
-                message: format!("programs for {} have no numbers", control.word()),
-                help: "a number is for fanuc".into(),
-            });
+            return Err(error::nc(format!("programs for {} have no numbers", control.word()), "a number is for fanuc"));
         }
         if control.has_numbers() {
             let number = self.number();
             let last = u64::from(number) + tests as u64;
             if number == 0 || last > u64::from(LAST_NUMBER) {
-                return Err(CodegenError::Nc {
-                    message: format!("main has the number {number}, and the last test {last}"),
-                    help: format!(
-                        "numbers from 1 to {LAST_NUMBER} are expected: state a lower number, or write fewer tests"
-                    ),
-                });
+                return Err(error::nc(
+                    format!("main has the number {number}, and the last test {last}"),
+                    format!("numbers from 1 to {LAST_NUMBER} are expected: state a lower number, or write fewer tests"),
+                ));
             }
         }
         if self.tool_point && !control.has_tool_point() {
-            return Err(CodegenError::Nc {
-                message: format!("{} has no function that moves the tool point over the table", control.word()),
-                help: "write the motion of the axes".into(),
-            });
+            return Err(error::nc(
+                format!("{} has no function that moves the tool point over the table", control.word()),
+                "write the motion of the axes",
+            ));
         }
         Ok(())
     }

@@ -4,7 +4,7 @@ mod duration;
 
 use std::f64::consts::{PI, TAU};
 
-use abbe_model::ModelError;
+use abbe_model::Diagnostic;
 use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::chain::{BodyErrors, Machine};
 use abbe_model::frames::Point;
@@ -16,7 +16,7 @@ use abbe_model::session::planned::{planned, reaches};
 
 use super::block::Block;
 use super::{Control, NcOptions, Plane};
-use crate::error::CodegenError;
+use crate::error;
 
 /// Overshoot of a full circle, degrees: half a turn before and after (ISO 230-4 leaves it to the user).
 const FULL_CIRCLE_DEG: f64 = 180.0;
@@ -68,12 +68,7 @@ enum Shape {
 impl Path {
     /// # Errors
     /// If the test has no motion, or an axis would leave its travel.
-    pub fn of(
-        machine: &Machine,
-        test: &Test,
-        control: &dyn Control,
-        options: &NcOptions,
-    ) -> Result<Path, CodegenError> {
+    pub fn of(machine: &Machine, test: &Test, control: &dyn Control, options: &NcOptions) -> Result<Path, Diagnostic> {
         let (range, runs, both_directions) = match &test.motion {
             Some(
                 Motion::Sweep { from, to, runs, both_directions, .. }
@@ -82,10 +77,10 @@ impl Path {
                 | Motion::Follow { from, to, runs, both_directions, .. },
             ) => ([*from, *to], *runs, *both_directions),
             Some(Motion::List) | None => {
-                return Err(CodegenError::Nc {
-                    message: format!("test \"{}\" states no motion", test.name),
-                    help: "add `sweep = { … }` or `path = { kind = \"circle\" | \"line\" | \"follow\", … }`".into(),
-                });
+                return Err(error::nc(
+                    format!("test \"{}\" states no motion", test.name),
+                    "add `sweep = { … }` or `path = { kind = \"circle\" | \"line\" | \"follow\", … }`",
+                ));
             }
         };
         reaches(machine, test).map_err(of_plan)?;
@@ -149,13 +144,13 @@ fn with_range(test: &Test, range: [f64; 2], steps: usize) -> Test {
     test
 }
 
-fn of_plan(error: ModelError) -> CodegenError {
+fn of_plan(error: Diagnostic) -> Diagnostic {
     let help = error.help().unwrap_or("plan within the travel of the machine").to_string();
-    CodegenError::Nc { message: error.to_string(), help }
+    error::nc(error.to_string(), help)
 }
 
 /// The states of a range in equal steps.
-fn states(machine: &Machine, test: &Test, range: [f64; 2], steps: usize) -> Result<Vec<Vec<f64>>, CodegenError> {
+fn states(machine: &Machine, test: &Test, range: [f64; 2], steps: usize) -> Result<Vec<Vec<f64>>, Diagnostic> {
     let readings = planned(machine, &with_range(test, range, steps)).map_err(of_plan)?;
     Ok((0..readings.rows()).map(|row| readings.positions.iter().map(|column| column[row]).collect()).collect())
 }
@@ -167,7 +162,7 @@ fn overshot(
     [from, to]: [f64; 2],
     options: &NcOptions,
     warnings: &mut Vec<String>,
-) -> Result<[f64; 2], CodegenError> {
+) -> Result<[f64; 2], Diagnostic> {
     let sign = (to - from).signum();
     let driven = match &test.motion {
         Some(Motion::Sweep { axis, .. } | Motion::Follow { axis, .. }) => Some(&machine.axes[*axis]),
@@ -234,7 +229,7 @@ impl Leg {
         measured: bool,
         control: &dyn Control,
         options: &NcOptions,
-    ) -> Result<Leg, CodegenError> {
+    ) -> Result<Leg, Diagnostic> {
         let span = (range[1] - range[0]).abs();
         let rest_s = (measured && test.station.handling().reads_at_rest).then_some(options.dwell_s);
         let steps_of = |step: f64| (span / step).round().max(1.0) as usize;
@@ -278,7 +273,7 @@ impl Leg {
                 (*speed, *radius)
             }
             Some(Motion::Follow { speed, .. }) => (*speed, 1.0),
-            _ => return Err(CodegenError::Nc { message: "no motion".into(), help: "state one".into() }),
+            _ => return Err(error::nc("no motion", "state one")),
         };
         let mut steps = match (rest_s, &test.motion) {
             (Some(_), Some(Motion::Circle { step, .. } | Motion::Follow { step, .. })) => steps_of(*step),
@@ -295,10 +290,10 @@ impl Leg {
             let factor = (error_mm / options.chord_error_mm).sqrt() * 1.02;
             steps = ((steps as f64 * factor).ceil() as usize).max(steps + 1);
             if steps > MOST_SEGMENTS {
-                return Err(CodegenError::Nc {
-                    message: format!("test \"{}\" needs more than {MOST_SEGMENTS} segments", test.name),
-                    help: "allow a larger chord error".into(),
-                });
+                return Err(error::nc(
+                    format!("test \"{}\" needs more than {MOST_SEGMENTS} segments", test.name),
+                    "allow a larger chord error",
+                ));
             }
         };
         let seconds = span * radius / speed / (vertices.len() - 1) as f64;
@@ -403,7 +398,7 @@ fn on_the_grid(
     axis: usize,
     mut vertices: Vec<Vec<f64>>,
     increment: f64,
-) -> Result<Vec<Vec<f64>>, CodegenError> {
+) -> Result<Vec<Vec<f64>>, Diagnostic> {
     let kind = machine.axes[axis].kind;
     let last = vertices.len() - 1;
     let Some(end) = vertices.last().map(|end| end[axis]) else { return Ok(vertices) };

@@ -1,5 +1,6 @@
 //! The program of a test as data: approach, centring, feed-in, traversals, feed-out, retreat.
 
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{BodyErrors, Machine};
 use abbe_model::frames::Point;
@@ -12,7 +13,7 @@ use super::block::Block;
 use super::comment::{name, test_of};
 use super::path::{Leg, Path};
 use super::{Control, NcOptions};
-use crate::error::CodegenError;
+use crate::error;
 
 /// The program of one test.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,7 +51,7 @@ impl Program {
         control: &dyn Control,
         options: &NcOptions,
         centred: bool,
-    ) -> Result<Program, CodegenError> {
+    ) -> Result<Program, Diagnostic> {
         let machine = &*session.machine;
         let writer = Writer { machine, test, letters: letters(machine)?, options };
         let path = Path::of(machine, test, control, options)?;
@@ -90,7 +91,7 @@ impl Program {
 }
 
 /// The letters of the axes.
-pub(super) fn letters(machine: &Machine) -> Result<Vec<char>, CodegenError> {
+pub(super) fn letters(machine: &Machine) -> Result<Vec<char>, Diagnostic> {
     let letter = |name: &String| {
         let mut letters = name.chars();
         letters.next().filter(|letter| letters.next().is_none() && "ABCXYZUVW".contains(*letter))
@@ -99,9 +100,11 @@ pub(super) fn letters(machine: &Machine) -> Result<Vec<char>, CodegenError> {
         .axes
         .iter()
         .map(|axis| {
-            letter(&axis.name).ok_or_else(|| CodegenError::Nc {
-                message: format!("axis `{}` has no letter of NC programs", axis.name),
-                help: "axes are called A, B, C, X, Y, Z, U, V or W in a program".into(),
+            letter(&axis.name).ok_or_else(|| {
+                error::nc(
+                    format!("axis `{}` has no letter of NC programs", axis.name),
+                    "axes are called A, B, C, X, Y, Z, U, V or W in a program",
+                )
             })
         })
         .collect()

@@ -23,11 +23,12 @@ mod text;
 mod typeset;
 mod typst;
 
+use abbe_model::Diagnostic;
 use abbe_model::effect::{Effect, Shape};
 
 use crate::check::Checked;
 use crate::equation::Equation;
-use crate::error::CodegenError;
+use crate::error;
 use crate::form::{Kind, Order};
 
 pub use language::Language;
@@ -89,9 +90,12 @@ const fn entry(
 ///
 /// # Errors
 /// If there is none.
-pub fn language(word: &str) -> Result<&'static OutputLanguage, CodegenError> {
+pub fn language(word: &str) -> Result<&'static OutputLanguage, Diagnostic> {
     let found = LANGUAGES.iter().find(|language| language.word == word);
-    found.ok_or_else(|| CodegenError::NoSuchLanguage { word: word.to_string(), known: words(|_| true, "and") })
+    found.ok_or_else(|| {
+        let known = words(|_| true, "and");
+        Diagnostic::equation(format!("no output language is called `{word}`; the languages are {known}"))
+    })
 }
 
 impl OutputLanguage {
@@ -109,7 +113,7 @@ impl OutputLanguage {
     ///
     /// # Errors
     /// If the language is for readers and the form is readable only as code: a curve, or derivatives of most forms.
-    pub fn print(&self, checked: &Checked<'_>, style: &Style) -> Result<String, CodegenError> {
+    pub fn print(&self, checked: &Checked<'_>, style: &Style) -> Result<String, Diagnostic> {
         if matches!(self.audience, Readers | Authors) {
             refuse_unreadable(checked.equation)?;
         }
@@ -123,15 +127,17 @@ impl OutputLanguage {
     ///
     /// # Errors
     /// As [`OutputLanguage::print`]; also if the language is for compilers.
-    pub fn print_system(&self, tests: &[TestEquations<'_>], style: &Style) -> Result<String, CodegenError> {
+    pub fn print_system(&self, tests: &[TestEquations<'_>], style: &Style) -> Result<String, Diagnostic> {
         for test in tests {
             if matches!(self.audience, Readers | Authors) {
                 refuse_unreadable(test.equation.equation)?;
             }
         }
-        self.language.system(tests, style).ok_or_else(|| CodegenError::NoSuchForm {
-            form: "all",
-            why: format!("is written as {} only", words(|entry| matches!(entry.audience, Readers | Authors), "or")),
+        self.language.system(tests, style).ok_or_else(|| {
+            error::no_form(
+                "all",
+                format!("is written as {} only", words(|entry| matches!(entry.audience, Readers | Authors), "or")),
+            )
         })
     }
 }
@@ -152,11 +158,14 @@ fn words(some: impl Fn(&OutputLanguage) -> bool, last: &str) -> String {
 }
 
 /// Refuses curves, which have hundreds of terms, and derivatives that have no short form.
-fn refuse_unreadable(equation: &Equation) -> Result<(), CodegenError> {
-    let languages = || words(|entry| entry.audience == Compilers, "or");
+fn refuse_unreadable(equation: &Equation) -> Result<(), Diagnostic> {
+    let languages = words(|entry| entry.audience == Compilers, "or");
     let curve = |effect: &&Effect| matches!(effect.shape, Shape::Curve { .. });
     if let Some(effect) = equation.options.effects.iter().find(curve) {
-        return Err(CodegenError::CurveForReaders { effect: effect.id(), languages: languages() });
+        return Err(Diagnostic::equation(format!(
+            "the curve `{}` is written as code only: as {languages}; to omit it, name the errors to keep",
+            effect.id()
+        )));
     }
     let what = match (equation.kind, equation.options.order) {
         _ if !equation.options.gradient => return Ok(()),
@@ -166,5 +175,8 @@ fn refuse_unreadable(equation: &Equation) -> Result<(), CodegenError> {
         (Kind::Coordinates, _) => "several coordinates",
         (Kind::Volumetric, _) => "the error vector",
     };
-    Err(CodegenError::GradientForReaders { what, languages: languages() })
+    Err(Diagnostic::equation(format!(
+        "the derivatives of {what} are written as code only: as {languages}; at zero errors they equal the first-order \
+         coefficients"
+    )))
 }

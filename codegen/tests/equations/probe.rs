@@ -3,7 +3,7 @@
 
 use abbe_codegen::print::{Layout, Style};
 use abbe_codegen::program::Input;
-use abbe_codegen::{CodegenError, Equation, Options, Order, Source, Subject, Variable, check};
+use abbe_codegen::{Equation, Options, Order, Source, Subject, Variable, check};
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName};
@@ -346,7 +346,7 @@ fn a_direction_that_the_table_tilts_away_from_has_no_first_order() {
     }
     let machine = Machine::from_code("w C A b X Y Z t").expect("a code");
     let refused = Equation::of(&machine, &Oblique, &errors(&machine)[..2], &options(Order::First));
-    assert!(matches!(refused, Err(CodegenError::ObliqueProbing)), "{refused:?}");
+    assert!(matches!(&refused, Err(error) if error.message.contains("probing `direction`")), "{refused:?}");
 }
 
 /// Printed code to compile and run: every language, with the values that dual numbers confirmed to 1e-12.

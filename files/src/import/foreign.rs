@@ -3,7 +3,7 @@
 use std::io::Read;
 use std::path::Path;
 
-use abbe_model::error::{Location, ModelError};
+use abbe_model::diagnostic::{Diagnostic, Location};
 
 use super::MAX_BYTES;
 use crate::stamp::FileStamp;
@@ -23,12 +23,8 @@ impl Foreign {
     ///
     /// # Errors
     /// If it cannot be read, or is larger than [`MAX_BYTES`].
-    pub fn read(store: &Store, path: &Path) -> Result<(Foreign, FileStamp), ModelError> {
-        let fault = |message: String| ModelError::Input {
-            location: Location::file(path),
-            message,
-            help: Some("name a file of readings".into()),
-        };
+    pub fn read(store: &Store, path: &Path) -> Result<(Foreign, FileStamp), Diagnostic> {
+        let fault = |message: String| Diagnostic::input(Location::file(path), message, "name a file of readings");
         let cannot = |cause: std::io::Error| fault(format!("cannot be read: {cause}"));
         let mut opened = store.open(path).map_err(cannot)?;
         let found = opened.state().map_err(cannot)?;

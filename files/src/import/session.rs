@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
+use abbe_model::diagnostic::{Diagnostic, Location};
 use abbe_model::document::edit::SessionText;
 use abbe_model::document::kind::Kind;
 use abbe_model::document::layout::{Columns, Format};
 use abbe_model::document::node::Node;
 use abbe_model::document::session::{Instrument, MachineFile, Session as Document, SessionMachine, Unknowns};
 use abbe_model::document::test::Test;
-use abbe_model::error::{Location, ModelError};
 use abbe_model::instrument::{Fault, InstrumentKind};
 use abbe_model::session::motion::Motion;
 use abbe_model::session::planned::checked_plan;
@@ -59,13 +59,13 @@ const OWN_KEYS: [(&str, &str); 4] = [
 ];
 
 /// Refuses keys of tests that an import states itself.
-fn check_keys(set: &Node) -> Result<(), ModelError> {
+fn check_keys(set: &Node) -> Result<(), Diagnostic> {
     let own = |key: &str| OWN_KEYS.iter().find(|(own, _)| *own == key);
     match set.entries().iter().find_map(|entry| own(&entry.key)) {
-        Some((key, help)) => Err(ModelError::Session {
-            message: format!("`{key}` is no key that a new test can be given: it follows from the file"),
-            help: (*help).into(),
-        }),
+        Some((key, help)) => Err(Diagnostic::session(
+            format!("`{key}` is no key that a new test can be given: it follows from the file"),
+            *help,
+        )),
         None => Ok(()),
     }
 }
@@ -103,7 +103,7 @@ impl Draft {
         kind: InstrumentKind,
         tests: &[String],
         set: &Node,
-    ) -> Result<Draft, ModelError> {
+    ) -> Result<Draft, Diagnostic> {
         check_keys(set)?;
         let MachineRead { source, bodies, .. } = read::machine_with_bodies(file, options)?;
         let document = Document {
@@ -169,7 +169,7 @@ impl Draft {
         names: &[String],
         like: Option<&str>,
         set: &Node,
-    ) -> Result<(Draft, Vec<String>), ModelError> {
+    ) -> Result<(Draft, Vec<String>), Diagnostic> {
         check_keys(set)?;
         let source = Text::read(&options.store, file, "the session file")?;
         let parsed = source.parse()?;
@@ -252,12 +252,12 @@ impl Draft {
         Ok((draft, tests))
     }
 
-    fn fault(&self, message: String, help: &str) -> ModelError {
-        ModelError::Input { location: Location::file(&self.file), message, help: Some(help.into()) }
+    fn fault(&self, message: String, help: &str) -> Diagnostic {
+        Diagnostic::input(Location::file(&self.file), message, help)
     }
 
     /// The test whose set-up a new one has, by its number.
-    fn set_up_of(&self, document: &Document, name: &str, like: Option<&str>) -> Result<usize, ModelError> {
+    fn set_up_of(&self, document: &Document, name: &str, like: Option<&str>) -> Result<usize, Diagnostic> {
         if let Some(like) = like {
             return document.test.iter().position(|test| test.name == like).ok_or_else(|| {
                 let names: Vec<&str> = document.test.iter().map(|test| test.name.as_str()).collect();
@@ -287,7 +287,7 @@ impl Draft {
     ///
     /// # Errors
     /// If the text is no session.
-    pub fn planned(&self) -> Result<Session, ModelError> {
+    pub fn planned(&self) -> Result<Session, Diagnostic> {
         let options = ReadOptions { read_data: false, ..self.options() };
         read::session_of(&Text::new(&self.file, &self.text.to_string()), &options).map(|(session, _)| session)
     }
@@ -296,7 +296,7 @@ impl Draft {
     ///
     /// # Errors
     /// If the readings cannot be used.
-    pub fn read(&self) -> Result<Session, ModelError> {
+    pub fn read(&self) -> Result<Session, Diagnostic> {
         let mut text = self.text.clone();
         if !self.awaited.is_empty() {
             text.keep_tests(&|name| !self.awaited.contains(name));
@@ -308,7 +308,7 @@ impl Draft {
     ///
     /// # Errors
     /// If the readings cannot be used.
-    pub fn read_alone(&self, test: &str) -> Result<Session, ModelError> {
+    pub fn read_alone(&self, test: &str) -> Result<Session, Diagnostic> {
         let mut text = self.text.clone();
         text.keep_tests(&|name| name == test);
         read::session_of(&Text::new(&self.file, &text.to_string()), &self.options()).map(|(session, _)| session)
@@ -352,7 +352,7 @@ impl Draft {
     ///
     /// # Errors
     /// If the text of the session cannot be edited.
-    pub fn apply(&mut self, test: &str, file: &Foreign, reading: &Reading) -> Result<String, ModelError> {
+    pub fn apply(&mut self, test: &str, file: &Foreign, reading: &Reading) -> Result<String, Diagnostic> {
         let name = self.data_name(file, matches!(reading.source, Source::Normalised { .. }));
         let (contents, format, columns) = match &reading.source {
             Source::AsItIs { format, columns } => (file.bytes.clone(), format.clone(), columns.clone()),
@@ -378,7 +378,7 @@ impl Draft {
     ///
     /// # Errors
     /// If the text of the session cannot be edited.
-    pub fn set_targets(&mut self, found: &Session) -> Result<Option<[f64; 3]>, ModelError> {
+    pub fn set_targets(&mut self, found: &Session) -> Result<Option<[f64; 3]>, Diagnostic> {
         let Some(key) = self.unknown_target else { return Ok(None) };
         let mut stated = None;
         for test in &found.tests {
@@ -395,7 +395,7 @@ impl Draft {
     ///
     /// # Errors
     /// If the text of the session cannot be edited.
-    pub fn share_layout(&mut self, readings: &[&Reading]) -> Result<(), ModelError> {
+    pub fn share_layout(&mut self, readings: &[&Reading]) -> Result<(), Diagnostic> {
         let layouts: Vec<(&Format, &Columns)> = (readings.iter())
             .filter_map(|reading| match &reading.source {
                 Source::AsItIs { format, columns } => Some((format, columns)),
@@ -467,10 +467,10 @@ fn placeholder(name: &str) -> String {
     format!("{name}.csv")
 }
 
-fn test_of(keys: &Node) -> Result<Test, ModelError> {
+fn test_of(keys: &Node) -> Result<Test, Diagnostic> {
     Parsed::of_node(keys.clone()).document()
 }
 
-fn unreadable(file: &Path, cause: &std::io::Error) -> ModelError {
-    ModelError::Input { location: Location::file(file), message: format!("cannot be read: {cause}"), help: None }
+fn unreadable(file: &Path, cause: &std::io::Error) -> Diagnostic {
+    Diagnostic::input(Location::file(file), format!("cannot be read: {cause}"), None)
 }

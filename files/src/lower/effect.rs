@@ -119,7 +119,7 @@ fn one(
     }
     let tests = tests(document.tests.as_deref().unwrap_or_default(), declared).within("tests")?;
     let prior = prior(document, &component, &shape, &context.of_instruments)?;
-    shape.check().map_err(|fault| Fault::new(fault.to_string(), None).at("shape"))?;
+    shape.check().map_err(|fault| Fault::new(fault, None).at("shape"))?;
     Ok(Effect { tests, prior, ..Effect::new(component, driver, shape) })
 }
 

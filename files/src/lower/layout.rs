@@ -1,12 +1,12 @@
 //! The layout of the data files of other programs.
 
+use abbe_model::diagnostic::Location;
 use abbe_model::document::fault::{Fault, Within};
 use abbe_model::document::from_node;
 use abbe_model::document::layout as document;
 use abbe_model::document::node::Value;
 use abbe_model::document::value::Count;
 use abbe_model::driver::column;
-use abbe_model::error::Location;
 
 use crate::table::encoding;
 use crate::table::request::{ColumnMapping, Format};

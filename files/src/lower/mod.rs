@@ -13,13 +13,13 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use abbe_model::chain::Machine;
+use abbe_model::diagnostic::Location;
 use abbe_model::document::effect as effect_document;
 use abbe_model::document::fault::{Fault, Within};
 use abbe_model::document::node::Node;
 use abbe_model::document::session as document;
 use abbe_model::driver::column;
 use abbe_model::effect::Effect;
-use abbe_model::error::Location;
 use abbe_model::instrument::{InstrumentKind, InstrumentParameter, kinds};
 use abbe_model::session::expression::Constant;
 use abbe_model::session::{self, Session, Test};

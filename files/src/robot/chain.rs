@@ -4,7 +4,7 @@ use std::path::Path;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::code::MAX_AXES;
-use abbe_model::error::{Location, ModelError};
+use abbe_model::diagnostic::{Diagnostic, Location};
 use nalgebra::{Isometry3, Vector3};
 
 /// A movable joint, with all joints at zero.
@@ -41,16 +41,16 @@ pub struct Chain {
 
 impl Chain {
     /// Refuses a chain with more joints than a machine has axes, before anything is made of it.
-    pub(super) fn within_limit(self, file: &Path) -> Result<Chain, ModelError> {
+    pub(super) fn within_limit(self, file: &Path) -> Result<Chain, Diagnostic> {
         let joints = self.joints.len();
         if joints <= MAX_AXES {
             return Ok(self);
         }
-        Err(ModelError::Input {
-            location: Location::file(file),
-            message: format!("a chain of {joints} joints; the limit is {MAX_AXES} axes"),
-            help: Some("name the file of one serial chain".into()),
-        })
+        Err(Diagnostic::input(
+            Location::file(file),
+            format!("a chain of {joints} joints; the limit is {MAX_AXES} axes"),
+            "name the file of one serial chain",
+        ))
     }
 
     /// The axis of a joint in the frame of the base: a point of it in mm, and its direction.

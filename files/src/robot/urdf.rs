@@ -8,7 +8,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use abbe_model::axis::AxisKind;
-use abbe_model::error::{Location, ModelError};
+use abbe_model::diagnostic::{Diagnostic, Location};
 use abbe_model::unit::Unit;
 use abbe_model::words::{first_of, number};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -79,16 +79,14 @@ pub struct Urdf {
 ///
 /// # Errors
 /// If it is no URDF, or its links form no tree, with the line and what to do.
-pub fn read(source: &Source) -> Result<Urdf, ModelError> {
+pub fn read(source: &Source) -> Result<Urdf, Diagnostic> {
     let text = &source.text;
     // The bytes at which lines end, so that the line of a byte is found by bisection.
     let ends: Vec<usize> =
         text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(place, _)| place).collect();
     let line_of = |byte: usize| 1 + ends.partition_point(|end| *end < byte);
-    let fault = |byte: usize, message: String, help: &str| ModelError::Input {
-        location: Location::line(&source.file, line_of(byte)),
-        message,
-        help: Some(help.into()),
+    let fault = |byte: usize, message: String, help: &str| {
+        Diagnostic::input(Location::line(&source.file, line_of(byte)), message, help)
     };
     if let Some(byte) = text.find("<xacro:") {
         let help = "write the URDF that it describes: `xacro FILE.xacro > robot.urdf`";
@@ -167,11 +165,8 @@ pub fn read(source: &Source) -> Result<Urdf, ModelError> {
     if urdf.name.is_empty() && urdf.joints.is_empty() {
         return Err(fault(0, "no element <robot>".into(), "name a URDF file"));
     }
-    urdf.connect().map_err(|(line, message, help)| ModelError::Input {
-        location: Location::line(&source.file, line),
-        message,
-        help: Some(help),
-    })?;
+    urdf.connect()
+        .map_err(|(line, message, help)| Diagnostic::input(Location::line(&source.file, line), message, help))?;
     Ok(urdf)
 }
 
@@ -252,11 +247,9 @@ impl Urdf {
     ///
     /// # Errors
     /// If there is no such link, or it is not clear where the arm ends.
-    pub fn path(&self, file: &Path, tip: Option<&str>) -> Result<(Vec<&UrdfJoint>, String), ModelError> {
-        let fault = |line: usize, message: String, help: String| ModelError::Input {
-            location: if line > 0 { Location::line(file, line) } else { Location::file(file) },
-            message,
-            help: Some(help),
+    pub fn path(&self, file: &Path, tip: Option<&str>) -> Result<(Vec<&UrdfJoint>, String), Diagnostic> {
+        let fault = |line: usize, message: String, help: String| {
+            Diagnostic::input(if line > 0 { Location::line(file, line) } else { Location::file(file) }, message, help)
         };
         let tip = match tip {
             Some(tip) if self.links.iter().any(|link| link == tip) => tip.to_string(),
@@ -397,7 +390,7 @@ impl Urdf {
     ///
     /// # Errors
     /// As [`Urdf::path`].
-    pub fn chain(&self, file: &Path, tip: Option<&str>) -> Result<Chain, ModelError> {
+    pub fn chain(&self, file: &Path, tip: Option<&str>) -> Result<Chain, Diagnostic> {
         let (path, flange) = self.path(file, tip)?;
         let mut frame = Isometry3::identity();
         let (mut joints, mut assumed) = (Vec::new(), Vec::new());

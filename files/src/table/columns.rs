@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use abbe_model::chain::Machine;
+use abbe_model::diagnostic::{Diagnostic, Location};
 use abbe_model::document::layout::Traversals;
 use abbe_model::document::value::Count;
 use abbe_model::driver::column;
-use abbe_model::error::{Location, ModelError};
 use abbe_model::instrument::Fault;
 use abbe_model::instrument::Station;
 use abbe_model::instrument::column::Quantity;
@@ -138,7 +138,7 @@ pub(super) fn columns(
     file: &Path,
     first: &Row,
     header: Option<&Row>,
-) -> Result<Vec<Column>, ModelError> {
+) -> Result<Vec<Column>, Diagnostic> {
     let line = first.line;
     let columns = match request.columns {
         Some(mapped) => mapped_columns(request, file, mapped, header, first)?,
@@ -146,38 +146,38 @@ pub(super) fn columns(
     };
     for (index, column) in columns.iter().enumerate() {
         if let Some(other) = columns[..index].iter().find(|other| other.role.same_as(&column.role)) {
-            return Err(ModelError::Input {
-                location: Location::line(file, line),
-                message: format!("columns `{}` and `{}` have the same meaning", other.name, column.name),
-                help: Some("keep one of them; [columns] can name the one to read".into()),
-            });
+            return Err(Diagnostic::input(
+                Location::line(file, line),
+                format!("columns `{}` and `{}` have the same meaning", other.name, column.name),
+                "keep one of them; [columns] can name the one to read",
+            ));
         }
     }
     Ok(columns)
 }
 
-fn own_columns(request: &Request<'_>, file: &Path, header: Option<&Row>) -> Result<Vec<Column>, ModelError> {
+fn own_columns(request: &Request<'_>, file: &Path, header: Option<&Row>) -> Result<Vec<Column>, Diagnostic> {
     let Some(row) = header else {
-        return Err(ModelError::Input {
-            location: Location::file(file),
-            message: "a data file without a header and without [columns] that name its columns".into(),
-            help: Some("add [columns] with `name = number`, counted from 1, such as `j1_rad = 1`".into()),
-        });
+        return Err(Diagnostic::input(
+            Location::file(file),
+            "a data file without a header and without [columns] that name its columns",
+            "add [columns] with `name = number`, counted from 1, such as `j1_rad = 1`",
+        ));
     };
     let known = known(request);
     let header = &row.cells;
     let mut columns = Vec::new();
     for (index, name) in header.iter().enumerate() {
         let Some(role) = Role::of(name, request).or_else(|| Role::of(&name.to_lowercase(), request)) else {
-            return Err(ModelError::Input {
-                location: Location::line(file, row.line),
-                message: if row.keyed {
+            return Err(Diagnostic::input(
+                Location::line(file, row.line),
+                if row.keyed {
                     format!("unknown key `{name}`")
                 } else {
                     format!("column {} has the unknown name `{name}`", index + 1)
                 },
-                help: Some(unknown_column_help(request, name, header, &known)),
-            });
+                unknown_column_help(request, name, header, &known),
+            ));
         };
         columns.push(Column { role, index, name: name.clone(), traversals: Vec::new() });
     }
@@ -218,14 +218,10 @@ fn mapped_columns(
     mapped: &[ColumnMapping],
     header: Option<&Row>,
     first: &Row,
-) -> Result<Vec<Column>, ModelError> {
+) -> Result<Vec<Column>, Diagnostic> {
     let mut columns: Vec<Column> = Vec::new();
     for entry in mapped {
-        let fault = |message: String, help: String| ModelError::Input {
-            location: entry.location.clone(),
-            message,
-            help: Some(help),
-        };
+        let fault = |message: String, help: String| Diagnostic::input(entry.location.clone(), message, help);
         let Some(role) = Role::of(&entry.own, request).or_else(|| Role::of(&entry.own.to_lowercase(), request)) else {
             let known = known(request);
             let help = match entry.own.starts_with(column::PREFIX) {
@@ -272,14 +268,11 @@ fn mapped_columns(
         columns.push(Column { role, index, name, traversals });
     }
     match header {
-        Some(header) if are_readings(request, mapped, &columns, header) => Err(ModelError::Input {
-            location: Location::line(file, header.line),
-            message: "the first row contains numbers where a header is expected; it would not be read".into(),
-            help: Some(
-                "a file without a header declares `[format] header = false`; lines above the header are skipped with `skip_lines`"
-                    .into(),
-            ),
-        }),
+        Some(header) if are_readings(request, mapped, &columns, header) => Err(Diagnostic::input(
+            Location::line(file, header.line),
+            "the first row contains numbers where a header is expected; it would not be read",
+            "a file without a header declares `[format] header = false`; lines above the header are skipped with `skip_lines`",
+        )),
         _ => Ok(columns),
     }
 }

@@ -5,9 +5,9 @@
 
 use std::path::Path;
 
+use abbe_model::Diagnostic;
 use abbe_model::chain::Machine;
 use abbe_model::driver::column;
-use abbe_model::error::ModelError;
 use abbe_model::instrument::Station;
 use abbe_model::instrument::column::{Column, Quantity};
 use abbe_model::session::readings::Readings;
@@ -28,7 +28,7 @@ impl DataFormat for Csv {
         true
     }
 
-    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, ModelError> {
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, Diagnostic> {
         let lines = Lines::open(request.store, file, &request.format)?;
         Ok(Content::Table(Table {
             stamp: lines.stamp().clone(),
@@ -52,7 +52,7 @@ impl CsvRows {
     }
 
     /// The cells of a line with quotes.
-    fn quoted(&self, text: &str) -> Result<Vec<String>, ModelError> {
+    fn quoted(&self, text: &str) -> Result<Vec<String>, Diagnostic> {
         if text.matches('"').count() % 2 == 1 {
             return Err(self.lines.fault("a quote is not closed".into(), "a quoted cell must end on its line"));
         }
@@ -73,7 +73,7 @@ impl CsvRows {
 }
 
 impl Rows for CsvRows {
-    fn next_row(&mut self) -> Result<Option<Row>, ModelError> {
+    fn next_row(&mut self) -> Result<Option<Row>, Diagnostic> {
         while let Some(line) = self.lines.next_line()? {
             let content = line.text.trim();
             if content.is_empty() || is_comment(content) {

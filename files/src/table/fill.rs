@@ -4,7 +4,7 @@ use std::collections::TryReserveError;
 use std::hash::{DefaultHasher, Hasher};
 use std::path::{Path, PathBuf};
 
-use abbe_model::error::{Location, ModelError};
+use abbe_model::diagnostic::{Diagnostic, Location};
 use abbe_model::instrument::column::{OF_ROTATION, Quantity};
 use abbe_model::instrument::{Fault, MAX_CHANNELS};
 use abbe_model::session::readings::{Origin, Readings};
@@ -43,7 +43,7 @@ pub(super) trait Cells {
     /// The text in a column.
     fn text(&self, column: &Column) -> &str;
     /// The error of a fault in a column, with its place.
-    fn error(&self, column: &Column, fault: Fault) -> ModelError;
+    fn error(&self, column: &Column, fault: Fault) -> Diagnostic;
     /// Whether the cell of a column is empty.
     fn lacks(&self, column: &Column) -> bool;
     /// Adds all cells of the row to a hash.
@@ -66,12 +66,12 @@ impl Cells for FileRow<'_> {
         &self.row.cells[column.index]
     }
 
-    fn error(&self, column: &Column, (message, help): Fault) -> ModelError {
-        ModelError::Input {
-            location: Location { span: self.row.span(column.index), ..Location::line(self.file, self.row.line) },
-            message: format!("{}: {message}", self.row.place(column.index, &column.name)),
-            help: Some(help),
-        }
+    fn error(&self, column: &Column, (message, help): Fault) -> Diagnostic {
+        Diagnostic::input(
+            Location { span: self.row.span(column.index), ..Location::line(self.file, self.row.line) },
+            format!("{}: {message}", self.row.place(column.index, &column.name)),
+            help,
+        )
     }
 
     fn lacks(&self, column: &Column) -> bool {
@@ -95,11 +95,13 @@ pub(super) fn read(
     rows: &mut dyn Rows,
     has_header: bool,
     request: &Request<'_>,
-) -> Result<Filling, ModelError> {
-    let empty = |what: &str| ModelError::Input {
-        location: Location::file(file),
-        message: format!("an empty data file: {what}"),
-        help: Some("check that the measurement was exported".into()),
+) -> Result<Filling, Diagnostic> {
+    let empty = |what: &str| {
+        Diagnostic::input(
+            Location::file(file),
+            format!("an empty data file: {what}"),
+            "check that the measurement was exported",
+        )
     };
     let Some(first) = rows.next_row()? else {
         return Err(empty("no header and no readings"));
@@ -108,19 +110,18 @@ pub(super) fn read(
     let header = has_header.then_some(&first);
     let columns = columns::columns(request, file, &first, header)?;
     let names = header.map(|row| row.cells.as_slice());
-    required::required(request, &columns, names).map_err(|(message, help)| ModelError::Input {
-        location: Location::line(file, first.line),
-        message,
-        help: Some(help),
-    })?;
+    required::required(request, &columns, names)
+        .map_err(|(message, help)| Diagnostic::input(Location::line(file, first.line), message, help))?;
     let mut filled = Filled::new(request, columns, 0);
     let push = |filled: &mut Filled<'_>, row: &Row| {
         let cells = FileRow { file, row, format: &request.format };
         if filled.line.len() == filled.line.capacity() && filled.line.len() >= MIN_TESTED {
-            filled.reserve().map_err(|_| ModelError::Input {
-                location: Location::line(file, row.line),
-                message: format!("too little memory for more than {} rows", filled.line.len()),
-                help: Some("free memory, thin out the readings, or split the file into several tests".into()),
+            filled.reserve().map_err(|_| {
+                Diagnostic::input(
+                    Location::line(file, row.line),
+                    format!("too little memory for more than {} rows", filled.line.len()),
+                    "free memory, thin out the readings, or split the file into several tests",
+                )
             })?;
         }
         filled.push(&cells)?;
@@ -128,7 +129,7 @@ pub(super) fn read(
         if filled.can_have_copies() {
             filled.cells.push(duplicates::hash_of(|hasher| cells.hash(hasher)));
         }
-        Ok::<(), ModelError>(())
+        Ok::<(), Diagnostic>(())
     };
     let traversals = filled.traversals(file)?;
     let mut all = Vec::new();
@@ -159,11 +160,9 @@ pub(super) fn read(
     let warnings: Vec<String> = filled.lacking(file).into_iter().chain(filled.remove_duplicates(file)).collect();
     match filled.line[..] {
         [] => Err(empty("a header without readings")),
-        [line] => Err(ModelError::Input {
-            location: Location::line(file, line),
-            message: "one reading, which is not enough for a fit".into(),
-            help: Some(NOT_ENOUGH.into()),
-        }),
+        [line] => {
+            Err(Diagnostic::input(Location::line(file, line), "one reading, which is not enough for a fit", NOT_ENOUGH))
+        }
         _ => Ok(Filling {
             quantities: columns::quantities(&filled.columns),
             by_socket: filled.by_socket(Some(file)),
@@ -178,7 +177,7 @@ const MIN_TESTED: usize = 1 << 14;
 /// What to do about a test with fewer than two readings.
 pub(super) const NOT_ENOUGH: &str = "a test needs at least two readings, and as many as it has parameters";
 
-fn wrong_width(file: &Path, row: &Row, width: usize, format: &Format) -> ModelError {
+fn wrong_width(file: &Path, row: &Row, width: usize, format: &Format) -> Diagnostic {
     let found = row.cells.len();
     let cells = |n: usize| format!("{n} cell{}", if n == 1 { "" } else { "s" });
     let help = if format.separator == b',' && found > width {
@@ -187,11 +186,11 @@ fn wrong_width(file: &Path, row: &Row, width: usize, format: &Format) -> ModelEr
     } else {
         "complete the row or remove it"
     };
-    ModelError::Input {
-        location: Location::line(file, row.line),
-        message: format!("a row of {}, but the file has {width} columns", cells(found)),
-        help: Some(help.into()),
-    }
+    Diagnostic::input(
+        Location::line(file, row.line),
+        format!("a row of {}, but the file has {width} columns", cells(found)),
+        help,
+    )
 }
 
 /// The readings while they are filled.
@@ -248,15 +247,11 @@ impl<'a> Filled<'a> {
     }
 
     /// The number of traversals whose readings stand side by side; 0 if each row is a reading.
-    fn traversals(&self, file: &Path) -> Result<usize, ModelError> {
+    fn traversals(&self, file: &Path) -> Result<usize, Diagnostic> {
         let counts = self.columns.iter().filter(|column| !column.traversals.is_empty());
         let counts: Vec<usize> = counts.map(|column| column.traversals.len()).collect();
         let Some(first) = counts.first() else { return Ok(0) };
-        let fault = |message: &str, help: &str| ModelError::Input {
-            location: Location::file(file),
-            message: message.to_string(),
-            help: Some(help.to_string()),
-        };
+        let fault = |message: &str, help: &str| Diagnostic::input(Location::file(file), message, help);
         if self.columns.iter().any(|column| matches!(column.role, Role::Time | Role::Run)) {
             return Err(fault(
                 "a time or a run for readings of several traversals in a row",
@@ -299,7 +294,7 @@ impl<'a> Filled<'a> {
     ///
     /// # Errors
     /// A cell that is not what its column expects, with its place.
-    pub fn push(&mut self, row: &impl Cells) -> Result<(), ModelError> {
+    pub fn push(&mut self, row: &impl Cells) -> Result<(), Diagnostic> {
         let can_lack = self.can_lack();
         let readings = &mut self.readings;
         let mut observed = [f64::NAN; MAX_CHANNELS];
@@ -401,11 +396,11 @@ impl<'a> Filled<'a> {
     ///
     /// # Errors
     /// If the axes of the circle are not at right angles.
-    pub fn complete(&mut self, rows: usize) -> Result<(), ModelError> {
+    pub fn complete(&mut self, rows: usize) -> Result<(), Diagnostic> {
         if !self.polar.is_empty()
             && let Some(states) = trajectory::on_circle(self.request.machine, self.request.test, &self.polar)
         {
-            let states = states.map_err(|(message, help)| ModelError::Session { message, help })?;
+            let states = states.map_err(|(message, help)| Diagnostic::session(message, help))?;
             for (axis, positions) in self.readings.positions.iter_mut().enumerate() {
                 if positions.is_empty() {
                     *positions = states.iter().map(|state| state[axis]).collect();

@@ -5,7 +5,7 @@
 use std::io::Read;
 use std::path::Path;
 
-use abbe_model::error::ModelError;
+use abbe_model::Diagnostic;
 use abbe_model::session::readings::Readings;
 
 use super::request::Request;
@@ -22,7 +22,7 @@ pub(super) trait DataFormat: Sync {
     ///
     /// # Errors
     /// If the file cannot be opened or is not of this format, with its location and what to do.
-    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, ModelError>;
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, Diagnostic>;
 }
 
 /// The content of a data file.
@@ -49,7 +49,7 @@ pub(super) trait Rows {
     ///
     /// # Errors
     /// If the next line is not a row of the format, or beyond a limit.
-    fn next_row(&mut self) -> Result<Option<Row>, ModelError>;
+    fn next_row(&mut self) -> Result<Option<Row>, Diagnostic>;
 
     /// Takes a row that is no longer needed, so that the next one can use its memory: a file has millions of them.
     fn reuse(&mut self, _: Row) {}

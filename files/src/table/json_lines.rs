@@ -5,7 +5,7 @@
 use std::fmt;
 use std::path::Path;
 
-use abbe_model::error::ModelError;
+use abbe_model::Diagnostic;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_json::value::RawValue;
 
@@ -23,7 +23,7 @@ impl DataFormat for JsonLines {
         has_extension(file, &["jsonl", "ndjson"])
     }
 
-    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, ModelError> {
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, Diagnostic> {
         let lines = Lines::open(request.store, file, &request.format)?;
         Ok(Content::Table(Table {
             stamp: lines.stamp().clone(),
@@ -62,7 +62,7 @@ struct ObjectRows {
 }
 
 impl Rows for ObjectRows {
-    fn next_row(&mut self) -> Result<Option<Row>, ModelError> {
+    fn next_row(&mut self) -> Result<Option<Row>, Diagnostic> {
         if let Some(row) = self.first.take() {
             return Ok(Some(row));
         }
@@ -93,7 +93,7 @@ const OBJECT: &str = "a line is one object, such as {\"c_deg\": 0.0, \"length_mm
 
 impl ObjectRows {
     /// The keys of a line and their cells, in the order of the line.
-    fn cells(&self, text: &str) -> Result<Vec<(String, String)>, ModelError> {
+    fn cells(&self, text: &str) -> Result<Vec<(String, String)>, Diagnostic> {
         let object: Object<'_> = serde_json::from_str(text).map_err(|cause| {
             let message = cause.to_string();
             let message = message.split(" at line ").next().unwrap_or_default();
@@ -128,7 +128,7 @@ impl ObjectRows {
     }
 
     /// The cells in the order of the keys of the first object.
-    fn in_order(&self, mut cells: Vec<(String, String)>) -> Result<Vec<String>, ModelError> {
+    fn in_order(&self, mut cells: Vec<(String, String)>) -> Result<Vec<String>, Diagnostic> {
         const SAME: &str = "every object has the keys of the first one; write `null` where a value is missing";
         let mut ordered = Vec::with_capacity(self.keys.len());
         for key in &self.keys {

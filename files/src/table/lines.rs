@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use abbe_model::error::{Location, ModelError};
+use abbe_model::diagnostic::{Diagnostic, Location};
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
 use super::encoding;
@@ -60,17 +60,13 @@ pub(super) struct Lines {
 
 impl Lines {
     /// Opens a file.
-    pub fn open(store: &Store, file: &Path, format: &Format) -> Result<Lines, ModelError> {
+    pub fn open(store: &Store, file: &Path, format: &Format) -> Result<Lines, Diagnostic> {
         Self::within(store, file, format, LIMITS)
     }
 
     /// Opens a file with other limits.
-    pub fn within(store: &Store, file: &Path, format: &Format, limits: Limits) -> Result<Lines, ModelError> {
-        let fault = |message: String, help: &str| ModelError::Input {
-            location: Location::file(file),
-            message,
-            help: Some(help.into()),
-        };
+    pub fn within(store: &Store, file: &Path, format: &Format, limits: Limits) -> Result<Lines, Diagnostic> {
+        let fault = |message: String, help: &str| Diagnostic::input(Location::file(file), message, help);
         let opened = store.open(file).and_then(|opened| {
             let found = opened.state()?;
             if found.folder {
@@ -103,7 +99,7 @@ impl Lines {
     }
 
     /// The next line, or `None` at the end.
-    pub fn next_line(&mut self) -> Result<Option<Line>, ModelError> {
+    pub fn next_line(&mut self) -> Result<Option<Line>, Diagnostic> {
         loop {
             let Some(bytes) = self.read_line()? else {
                 return Ok(None);
@@ -123,7 +119,7 @@ impl Lines {
     }
 
     /// Counts the line that was read last as a row, within the largest number of rows.
-    pub fn count_row(&mut self) -> Result<(), ModelError> {
+    pub fn count_row(&mut self) -> Result<(), Diagnostic> {
         self.rows += 1;
         if self.rows > self.limits.rows {
             let most = self.limits.rows;
@@ -133,7 +129,7 @@ impl Lines {
     }
 
     /// Reads the next line into the buffer, without byte order mark and line end; returns its bytes in the file.
-    fn read_line(&mut self) -> Result<Option<Range<usize>>, ModelError> {
+    fn read_line(&mut self) -> Result<Option<Range<usize>>, Diagnostic> {
         let mut start = self.byte;
         self.buffer.clear();
         self.until_line_end()?;
@@ -176,7 +172,7 @@ impl Lines {
     }
 
     /// Reads until the buffer ends with a line end in the encoding of the file, or contains the longest line.
-    fn until_line_end(&mut self) -> Result<(), ModelError> {
+    fn until_line_end(&mut self) -> Result<(), Diagnostic> {
         while !self.ends_with(b'\n') && (self.buffer.len() as u64) < LONGEST_LINE {
             let room = LONGEST_LINE - self.buffer.len() as u64;
             let cut_short = self.encoding == Some(UTF_16LE) && self.buffer.last() == Some(&b'\n');
@@ -207,7 +203,7 @@ impl Lines {
     }
 
     /// The buffer as text.
-    fn decoded(&mut self) -> Result<String, ModelError> {
+    fn decoded(&mut self) -> Result<String, Diagnostic> {
         let (text, found) = encoding::decode(&self.buffer, self.encoding).map_err(|encoding| {
             let name = encoding::name_of(encoding);
             let help = "declare the encoding of the file, such as `[format] encoding = \"latin1\"`";
@@ -225,7 +221,7 @@ impl Lines {
     }
 
     /// An error in the line that was read last.
-    pub fn fault(&self, message: String, help: &str) -> ModelError {
-        ModelError::Input { location: Location::line(&self.file, self.line), message, help: Some(help.to_string()) }
+    pub fn fault(&self, message: String, help: &str) -> Diagnostic {
+        Diagnostic::input(Location::line(&self.file, self.line), message, help)
     }
 }

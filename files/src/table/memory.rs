@@ -3,7 +3,7 @@
 use std::hash::{DefaultHasher, Hash};
 use std::path::Path;
 
-use abbe_model::error::ModelError;
+use abbe_model::Diagnostic;
 use abbe_model::instrument::Fault;
 use abbe_model::session::limits;
 
@@ -74,7 +74,7 @@ impl Cells for Item<'_> {
         }
     }
 
-    fn error(&self, column: &Column, (message, help): Fault) -> ModelError {
+    fn error(&self, column: &Column, (message, help): Fault) -> Diagnostic {
         fault((format!("`{}`, item {}: {message}", column.name, self.item), help))
     }
 
@@ -97,7 +97,7 @@ impl Cells for Item<'_> {
 /// # Errors
 /// A column of an unknown name, of another length or with a number that is not finite; a missing column; decreasing
 /// time.
-pub(crate) fn read(given: &[MemoryColumn<'_>], request: &Request<'_>) -> Result<Filling, ModelError> {
+pub(crate) fn read(given: &[MemoryColumn<'_>], request: &Request<'_>) -> Result<Filling, Diagnostic> {
     let columns = roles(given, request).map_err(fault)?;
     let names: Vec<String> = given.iter().map(|column| column.name.to_string()).collect();
     required::required(request, &columns, Some(&names)).map_err(fault)?;
@@ -137,8 +137,8 @@ pub(crate) fn read(given: &[MemoryColumn<'_>], request: &Request<'_>) -> Result<
     Ok(Filling { quantities, by_socket: filled.by_socket(None), warnings: request.named(warnings) })
 }
 
-fn fault((message, help): Fault) -> ModelError {
-    ModelError::Session { message, help }
+fn fault((message, help): Fault) -> Diagnostic {
+    Diagnostic::session(message, help)
 }
 
 /// The role of each column.

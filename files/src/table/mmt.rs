@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use abbe_model::error::ModelError;
+use abbe_model::Diagnostic;
 use abbe_model::words::counted;
 
 use super::format::{Content, DataFormat, Rows, Table, has_extension, starts_with};
@@ -28,7 +28,7 @@ impl DataFormat for Mmt {
         has_extension(file, &["dat"]) && starts_with(file, store, |start| start.trim_start().starts_with(START))
     }
 
-    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, ModelError> {
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, Diagnostic> {
         let header = tpoint::columns(file, request)?[..4].to_vec();
         let lines = Lines::open(request.store, file, &request.format)?;
         Ok(Content::Table(Table {
@@ -66,7 +66,7 @@ const RECORD: &str = "a record starts with `CAT:` and has a line `TAA:` and a li
 
 impl RecordRows {
     /// Azimuth and elevation from a line of elevation and azimuth.
-    fn direction(&self, keyword: &str, text: &str) -> Result<[f64; 2], ModelError> {
+    fn direction(&self, keyword: &str, text: &str) -> Result<[f64; 2], Diagnostic> {
         let cells: Vec<&str> = text.split_whitespace().collect();
         let [elevation, azimuth] = cells[..] else {
             return Err(self
@@ -81,7 +81,7 @@ impl RecordRows {
     }
 
     /// The row of a record that ended before the line that was read last.
-    fn row(&mut self, record: Record) -> Result<Row, ModelError> {
+    fn row(&mut self, record: Record) -> Result<Row, Diagnostic> {
         let Record { star: Some(star), encoders: Some((encoders, line)) } = record else {
             let lacks = if record.star.is_none() { TRUE } else { ENCODERS };
             return Err(self.lines.fault(format!("the record that ends here has no `{lacks}`"), RECORD));
@@ -94,7 +94,7 @@ impl RecordRows {
 }
 
 impl Rows for RecordRows {
-    fn next_row(&mut self) -> Result<Option<Row>, ModelError> {
+    fn next_row(&mut self) -> Result<Option<Row>, Diagnostic> {
         if let Some(header) = self.header.take() {
             return Ok(Some(Row::of_cells(1, header)));
         }

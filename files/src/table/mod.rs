@@ -30,7 +30,7 @@ mod tpoint;
 
 use std::path::Path;
 
-use abbe_model::error::ModelError;
+use abbe_model::Diagnostic;
 use abbe_model::instrument::column::Quantity;
 use fill::{BySocket, Filling};
 use format::Content;
@@ -54,7 +54,7 @@ pub(crate) struct Data {
 ///
 /// # Errors
 /// Every fault that prevents the use of the file, with its line and what to do.
-pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<Data, ModelError> {
+pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<Data, Diagnostic> {
     match formats::of(file, request.store).open(file, request)? {
         Content::Table(mut table) => {
             let Filling { by_socket, quantities, warnings } =

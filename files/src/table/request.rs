@@ -1,8 +1,8 @@
 //! What a test requires of its data file, and what the session states of the layout of the file.
 
 use abbe_model::chain::Machine;
+use abbe_model::diagnostic::Location;
 pub(crate) use abbe_model::document::layout::ForeignColumn;
-use abbe_model::error::Location;
 use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::Test;
 use abbe_model::session::motion::Motion;

@@ -7,7 +7,7 @@ use std::io::{Cursor, Read, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use abbe_model::error::{Location, ModelError};
+use abbe_model::diagnostic::{Diagnostic, Location};
 use calamine::{Data, Error, Ods, Reader, Sheets, Xls, Xlsb, Xlsx, XlsxError, open_workbook_from_rs};
 use zip::ZipArchive;
 
@@ -26,7 +26,7 @@ impl DataFormat for Spreadsheet {
         has_extension(file, &["xlsx", "xlsm", "xlsb", "xls", "ods"])
     }
 
-    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, ModelError> {
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, Diagnostic> {
         let (stamp, rows) = rows(request.store, file, &request.format)?;
         Ok(Content::Table(Table {
             stamp,
@@ -40,7 +40,7 @@ impl DataFormat for Spreadsheet {
 struct SheetRows(std::vec::IntoIter<Row>);
 
 impl Rows for SheetRows {
-    fn next_row(&mut self) -> Result<Option<Row>, ModelError> {
+    fn next_row(&mut self) -> Result<Option<Row>, Diagnostic> {
         Ok(self.0.next())
     }
 }
@@ -59,9 +59,8 @@ const MAX_CELLS: usize = 20_000_000;
 const MAX_TEXT: usize = 1 << 20;
 
 /// The rows of a sheet, and the state of the file.
-fn rows(store: &Store, file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>), ModelError> {
-    let fault =
-        |message: String, help: String| ModelError::Input { location: Location::file(file), message, help: Some(help) };
+fn rows(store: &Store, file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>), Diagnostic> {
+    let fault = |message: String, help: String| Diagnostic::input(Location::file(file), message, help);
     let broken = |cause: Error| {
         fault(
             format!("the spreadsheet cannot be read: {cause}"),

@@ -7,7 +7,7 @@
 use std::path::Path;
 
 use abbe_model::axis::AxisKind;
-use abbe_model::error::{Location, ModelError};
+use abbe_model::diagnostic::{Diagnostic, Location};
 use abbe_model::words::counted;
 
 use super::format::{Content, DataFormat, Rows, Table, has_extension, starts_with};
@@ -24,7 +24,7 @@ impl DataFormat for TPoint {
         has_extension(file, &["dat"]) && starts_with(file, store, |start| second_line(start).starts_with(':'))
     }
 
-    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, ModelError> {
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, Diagnostic> {
         let header = columns(file, request)?;
         let lines = Lines::open(request.store, file, &request.format)?;
         Ok(Content::Table(Table {
@@ -43,12 +43,8 @@ fn second_line(start: &str) -> &str {
 ///
 /// # Errors
 /// If the instrument of the test does not observe directions, or the machine has not two rotary axes.
-pub(super) fn columns(file: &Path, request: &Request<'_>) -> Result<Vec<String>, ModelError> {
-    let fault = |message: String, help: &str| ModelError::Input {
-        location: Location::file(file),
-        message,
-        help: Some(help.into()),
-    };
+pub(super) fn columns(file: &Path, request: &Request<'_>) -> Result<Vec<String>, Diagnostic> {
+    let fault = |message: String, help: &str| Diagnostic::input(Location::file(file), message, help);
     if request.test.station.columns().iter().all(|column| column.stem != "true_azimuth") {
         let message = format!("a file of pointing observations for a test of kind `{}`", request.instrument().word());
         return Err(fault(message, "state `kind = \"pointing\"` in `[instrument]`"));
@@ -78,7 +74,7 @@ const STAR: &str = "a star is four numbers in degrees: true azimuth, true elevat
 
 impl StarRows {
     /// The lines in front of the stars: the caption, options, the latitude. Returns whether the mount is alt-azimuth.
-    fn skip_head(&mut self) -> Result<(), ModelError> {
+    fn skip_head(&mut self) -> Result<(), Diagnostic> {
         let mut is_alt_azimuth = false;
         self.lines.next_line()?;
         while let Some(line) = self.lines.next_line()? {
@@ -96,7 +92,7 @@ impl StarRows {
     }
 
     /// The next star.
-    fn star(&mut self) -> Result<Option<Row>, ModelError> {
+    fn star(&mut self) -> Result<Option<Row>, Diagnostic> {
         while let Some(line) = self.lines.next_line()? {
             let text = content(&line.text);
             if text.is_empty() {
@@ -123,7 +119,7 @@ fn content(text: &str) -> &str {
 }
 
 impl Rows for StarRows {
-    fn next_row(&mut self) -> Result<Option<Row>, ModelError> {
+    fn next_row(&mut self) -> Result<Option<Row>, Diagnostic> {
         if let Some(row) = self.first.take() {
             return Ok(Some(row));
         }

@@ -1,7 +1,7 @@
 //! Sizes that a structural code does not state, and the places that follow from them.
 
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
-use abbe_model::error::ModelError;
 use abbe_model::words::number;
 
 use super::body::{Body, Side};
@@ -64,24 +64,24 @@ pub(super) struct Geometry {
 impl Geometry {
     /// # Errors
     /// If a size is out of its range, or belongs to a part that the machine has not.
-    pub fn of(bodies: &[Body], stated: Sizes) -> Result<Geometry, ModelError> {
+    pub fn of(bodies: &[Body], stated: Sizes) -> Result<Geometry, Diagnostic> {
         let rotary = |side: Side| bodies.iter().filter(move |own| own.kind == AxisKind::Rotary && own.side() == side);
         let has_head = rotary(Side::Tool).next().is_some();
         if stated.pivot_mm.is_some() && !has_head {
-            return Err(ModelError::Plan {
-                message: "a pivot length is stated, but the head of this machine has no rotary axis".into(),
-                help: "state it for a code with a rotary axis between b and t".into(),
-            });
+            return Err(Diagnostic::session(
+                "a pivot length is stated, but the head of this machine has no rotary axis",
+                "state it for a code with a rotary axis between b and t",
+            ));
         }
         let within = |what: &str, stated: Option<f64>, usual: f64, [least, most]: [f64; 2]| {
             let mm = stated.unwrap_or(usual);
             if mm >= least && mm <= most {
                 return Ok(mm);
             }
-            Err(ModelError::Plan {
-                message: format!("{what} is {} mm", number(mm)),
-                help: format!("a value from {} to {} mm is expected", number(least), number(most)),
-            })
+            Err(Diagnostic::session(
+                format!("{what} is {} mm", number(mm)),
+                format!("a value from {} to {} mm is expected", number(least), number(most)),
+            ))
         };
         let moves_along_z = bodies.iter().any(|own| own.kind == AxisKind::Linear && own.along == 2);
         let usual_gauge = if moves_along_z { USUAL_GAUGE_MM } else { LONG_GAUGE_MM };

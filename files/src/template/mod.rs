@@ -11,9 +11,11 @@ mod rotary;
 
 use std::fmt::Write;
 
+use abbe_model::Diagnostic;
 use abbe_model::axis::{Axis, AxisKind};
+use abbe_model::chain::unknown_axis_kind;
 use abbe_model::code::StructuralCode;
-use abbe_model::error::ModelError;
+use abbe_model::code::structural_code;
 
 use self::body::{Body, Side};
 use self::geometry::Geometry;
@@ -25,12 +27,12 @@ pub use self::geometry::Sizes;
 /// # Errors
 /// If the code is invalid, has no axis, or has an axis that is no letter of ISO 841, so that its kind is not known; if a
 /// size is out of its range; if no test is possible.
-pub fn of_code(code: &str, sizes: Sizes) -> Result<[String; 2], ModelError> {
+pub fn of_code(code: &str, sizes: Sizes) -> Result<[String; 2], Diagnostic> {
     let parsed = StructuralCode::parse(code)?;
     let mut bodies = Vec::new();
     for (index, name) in parsed.axes().enumerate() {
         let (Some(kind), Some(direction)) = (AxisKind::of_letter(name), Axis::direction_of_letter(name)) else {
-            return Err(ModelError::UnknownAxisKind { axis: name.clone() });
+            return Err(unknown_axis_kind(name));
         };
         bodies.push(Body {
             name: name.clone(),
@@ -40,19 +42,15 @@ pub fn of_code(code: &str, sizes: Sizes) -> Result<[String; 2], ModelError> {
         });
     }
     if bodies.is_empty() {
-        return Err(ModelError::StructuralCode { code: code.to_string(), found: "it has no axis".into() });
+        return Err(structural_code(code, "it has no axis"));
     }
     let geometry = Geometry::of(&bodies, sizes)?;
-    let plan = plan::text(&bodies, &geometry).ok_or_else(|| ModelError::Plan {
-        message: format!(
+    let plan = plan::text(&bodies, &geometry).ok_or_else(|| Diagnostic::session(format!(
             "a bar cannot be set up for any test of {}: linear axes along X, Y and Z have to follow an axis of the head, \
              because a ball on it would be in the head",
             parsed.spaced()
-        ),
-        help: "write the chain and its axes into a machine file, and plan the tests of an instrument without a bar, such as \
-               `kind = \"laser\"`, `\"angle\"` or `\"tracker\"`; or use a code with linear axes along X, Y and Z"
-            .into(),
-    })?;
+        ), "write the chain and its axes into a machine file, and plan the tests of an instrument without a bar, such as \
+               `kind = \"laser\"`, `\"angle\"` or `\"tracker\"`; or use a code with linear axes along X, Y and Z"))?;
     Ok([machine(&parsed, &bodies, &geometry), plan])
 }
 

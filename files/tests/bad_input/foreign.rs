@@ -8,7 +8,7 @@ use abbe_model::session::Session;
 use super::{DATA, MACHINE, SESSION, assert_contains, error_text, session};
 
 /// Reads the session with these lines before its test, and a data file of these bytes.
-fn with_bytes(lines: &str, data: &[u8]) -> Result<Session, abbe_model::ModelError> {
+fn with_bytes(lines: &str, data: &[u8]) -> Result<Session, abbe_model::Diagnostic> {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("machine.toml"), MACHINE).unwrap();
     fs::write(folder.path().join("C100.csv"), data).unwrap();

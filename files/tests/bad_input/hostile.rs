@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use abbe_files::{ReadOptions, SourceMap};
-use abbe_model::ModelError;
+use abbe_model::Diagnostic;
 use abbe_model::session::Session;
 
 use super::{DATA, MACHINE, SESSION, assert_contains, error_text, session, with_data, with_machine, with_session};
@@ -40,24 +40,24 @@ impl Sandbox {
         self.0.path().join(name)
     }
 
-    fn read(&self, from: &str, to: &str, options: &ReadOptions) -> Result<Session, ModelError> {
+    fn read(&self, from: &str, to: &str, options: &ReadOptions) -> Result<Session, Diagnostic> {
         assert!(SESSION.contains(from));
         fs::write(self.at("inner/session.toml"), SESSION.replace(from, to)).unwrap();
         abbe_files::session(&self.at("inner/session.toml"), options)
     }
 
-    fn data(&self, name: &str) -> Result<Session, ModelError> {
+    fn data(&self, name: &str) -> Result<Session, Diagnostic> {
         self.read("\"C100.csv\"", &format!("\"{name}\""), &ReadOptions::default())
     }
 
     /// With a data file of this name, the session and its sources.
-    fn with_sources(&self, name: &str) -> Result<(Session, SourceMap), ModelError> {
+    fn with_sources(&self, name: &str) -> Result<(Session, SourceMap), Diagnostic> {
         let text = SESSION.replace("\"C100.csv\"", &format!("\"{name}\""));
         fs::write(self.at("inner/session.toml"), text).unwrap();
         abbe_files::session_with_sources(&self.at("inner/session.toml"), &ReadOptions::default())
     }
 
-    fn machine(&self, name: &str) -> Result<Session, ModelError> {
+    fn machine(&self, name: &str) -> Result<Session, Diagnostic> {
         self.read("\"machine.toml\"", &format!("\"{name}\""), &ReadOptions::default())
     }
 

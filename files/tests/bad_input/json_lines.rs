@@ -3,13 +3,13 @@
 use std::fs;
 
 use abbe_files::ReadOptions;
-use abbe_model::ModelError;
+use abbe_model::Diagnostic;
 use abbe_model::session::Session;
 
 use super::{DATA, MACHINE, SESSION, assert_contains, error_text, session};
 
 /// Reads the session with these lines before its test, and a data file of JSON Lines.
-fn with_lines(lines: &str, data: &str) -> Result<Session, ModelError> {
+fn with_lines(lines: &str, data: &str) -> Result<Session, Diagnostic> {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("machine.toml"), MACHINE).unwrap();
     fs::write(folder.path().join("C100.jsonl"), data).unwrap();

@@ -14,7 +14,7 @@ mod telescope;
 use std::fs;
 
 use abbe_files::ReadOptions;
-use abbe_model::ModelError;
+use abbe_model::Diagnostic;
 use abbe_model::session::Session;
 
 const MACHINE: &str = r#"name = "Small"
@@ -49,7 +49,7 @@ spindle_ball_mm = [0, 0, 0]
 const DATA: &str = "time_s,run,c_deg,length_mm\n0,1,0,99.9990\n1,1,90,100.0010\n2,1,180,100.0000\n3,1,270,99.9995\n";
 
 /// Reads a session from three files.
-fn session(machine: &str, session: &str, data: Option<&str>) -> Result<Session, ModelError> {
+fn session(machine: &str, session: &str, data: Option<&str>) -> Result<Session, Diagnostic> {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
     write("machine.toml", machine);
@@ -66,7 +66,7 @@ fn without_tests() -> &'static str {
 }
 
 /// The error as `file:line: message | help`, the file without its folder.
-fn error_text(result: Result<Session, ModelError>) -> String {
+fn error_text(result: Result<Session, Diagnostic>) -> String {
     let fault = result.expect_err("this input is bad");
     let location = fault.location().expect("a location in a file").clone();
     let name = location.file.file_name().unwrap().to_string_lossy().into_owned();

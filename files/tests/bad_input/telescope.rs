@@ -3,7 +3,7 @@
 use std::fs;
 
 use abbe_files::ReadOptions;
-use abbe_model::ModelError;
+use abbe_model::Diagnostic;
 use abbe_model::session::Session;
 
 use super::{assert_contains, error_text};
@@ -25,7 +25,7 @@ const MMT: &str = "CAT: FK5 1\nRAA:   77.375  347.25\nAA: 1 2\nTAA:   77.5  -12.
     CAT: FK5 2\nTAA:   20.25  170.0\nRAA:   20.5  169.875\n";
 
 /// Reads a session of one test with this file; `edit` changes the session and the machine.
-fn read(name: &str, data: &str, edit: impl Fn(&str) -> String) -> Result<Session, ModelError> {
+fn read(name: &str, data: &str, edit: impl Fn(&str) -> String) -> Result<Session, Diagnostic> {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
     write("mount.toml", &edit(MOUNT));

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use abbe_files::ReadOptions;
 use abbe_files::table::csv;
-use abbe_model::ModelError;
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
@@ -48,7 +48,7 @@ fn text(machine: &Machine) -> String {
     text + "\n[instrument]\nkind = \"tracker\"\nnoise_um = 10\n\n[[test]]\nname = \"T\"\ndata = \"T.csv\"\ntarget_mm = [1, 2, 3]\n"
 }
 
-fn read(folder: &Path) -> Result<Session, ModelError> {
+fn read(folder: &Path) -> Result<Session, Diagnostic> {
     abbe_files::session(&folder.join("session.toml"), &ReadOptions::default())
 }
 

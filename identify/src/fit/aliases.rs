@@ -11,10 +11,10 @@
 
 use std::ops::Range;
 
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 use faer::Mat;
 
-use crate::error::IdentifyError;
 use crate::numerics::parallel;
 use crate::numerics::solve::Svd;
 use crate::parameters::Role;
@@ -44,7 +44,7 @@ pub struct EffectAliases {
 ///
 /// # Errors
 /// If an alias cannot be evaluated.
-pub fn at_solution(problem: &Problem, beta: &[f64]) -> Result<Vec<EffectAliases>, IdentifyError> {
+pub fn at_solution(problem: &Problem, beta: &[f64]) -> Result<Vec<EffectAliases>, Diagnostic> {
     let effects = &problem.parameters.effects;
     if effects.iter().all(|effect| effect.covered_aliases().is_empty()) {
         return Ok(Vec::new());
@@ -103,7 +103,7 @@ pub fn at_solution(problem: &Problem, beta: &[f64]) -> Result<Vec<EffectAliases>
             Ok(AliasChange { alias: *alias, changes, delta_chi2: squares(&residual) - squares(&c) })
         };
         let aliases = parallel::map(own.len(), &|k| changed(&own[k]));
-        let aliases = aliases.into_iter().collect::<Result<Vec<AliasChange>, IdentifyError>>()?;
+        let aliases = aliases.into_iter().collect::<Result<Vec<AliasChange>, Diagnostic>>()?;
         found.push(EffectAliases { effect: number, aliases });
     }
     Ok(found)

@@ -1,10 +1,11 @@
 //! One explanation of several, on the user's word.
 
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 use abbe_model::words::counted;
 
-use crate::error::IdentifyError;
+use crate::error;
 use crate::problem::Problem;
 
 /// An effect with one of its explanations assumed, by its identifier: its own, or that of an alias, which then takes its
@@ -25,7 +26,7 @@ fn explained_by(effect: &Effect, id: &str) -> Option<Effect> {
 ///
 /// # Errors
 /// If no effect of the session has this explanation.
-pub fn assume(session: &Session, ids: &[String]) -> Result<Session, IdentifyError> {
+pub fn assume(session: &Session, ids: &[String]) -> Result<Session, Diagnostic> {
     let mut session = session.clone();
     for id in ids {
         let found = session.effects.iter().enumerate().find_map(|(k, effect)| Some((k, explained_by(effect, id)?)));
@@ -33,7 +34,7 @@ pub fn assume(session: &Session, ids: &[String]) -> Result<Session, IdentifyErro
             let own = session.effects.iter().map(Effect::id);
             let known = own.chain(session.effects.iter().flat_map(|effect| effect.aliases.iter().map(Effect::id)));
             let (what, these) = ("effect that is explained by", "the explanations are:");
-            return Err(IdentifyError::unknown("the session", what, id, these, known));
+            return Err(error::unknown("the session", what, id, these, known));
         };
         session.effects[k] = effect;
     }

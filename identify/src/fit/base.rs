@@ -18,12 +18,13 @@
 
 use std::sync::Arc;
 
+use abbe_model::Diagnostic;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use faer::Mat;
 
 use super::Fit;
-use crate::error::IdentifyError;
+use crate::error;
 use crate::numerics::null_space::{MIN_PIVOT, echelon};
 use crate::numerics::solve::Svd;
 use crate::numerics::triangle::Triangle;
@@ -100,7 +101,7 @@ const MAX_STEPS: usize = 20;
 ///
 /// # Errors
 /// If the model cannot be evaluated, or the null space has no stable parametrisation.
-pub fn base_parameters(problem: &Problem, fit: &Fit, gauge: Gauge) -> Result<BaseParameters, IdentifyError> {
+pub fn base_parameters(problem: &Problem, fit: &Fit, gauge: Gauge) -> Result<BaseParameters, Diagnostic> {
     let list = &problem.parameters.list;
     let sizes = problem.parameters.sizes();
     let preference = gauge.preference(&problem.session.machine, list);
@@ -110,7 +111,7 @@ pub fn base_parameters(problem: &Problem, fit: &Fit, gauge: Gauge) -> Result<Bas
     let (combinations, mut held) = echelon(exact.as_ref(), &preference, MIN_PIVOT);
     if held.len() < exact.ncols() {
         let found = "the null space of these readings has none that is stable";
-        return Err(IdentifyError::not_applicable("base parametrisation", found, "add tests or remove parameters"));
+        return Err(error::not_applicable("base parametrisation", found, "add tests or remove parameters"));
     }
     // First order: along the null space until the held parameters are at nominal.
     let mut beta = fit.beta.clone();
@@ -155,7 +156,7 @@ impl BaseParameters {
 ///
 /// # Errors
 /// As [`base_parameters`].
-pub fn report(problem: &Problem, fit: &Fit) -> Result<BaseResult, IdentifyError> {
+pub fn report(problem: &Problem, fit: &Fit) -> Result<BaseResult, Diagnostic> {
     let base = base_parameters(problem, fit, Gauge::OwnDirection)?;
     let list = &problem.parameters.list;
     let kept = (0..list.len()).filter(|j| !base.held.contains(j));
@@ -170,7 +171,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<BaseResult, IdentifyError>
 /// The directions of the scaled parameters at a point, the best determined first. Those whose singular value is a
 /// rounding error change no reading at all. A direction that is null at the nominal machine only changes readings at
 /// the solution.
-fn directions_at(problem: &Problem, beta: &[f64], triangles: &[Triangle]) -> Result<Svd, IdentifyError> {
+fn directions_at(problem: &Problem, beta: &[f64], triangles: &[Triangle]) -> Result<Svd, Diagnostic> {
     let sizes = problem.parameters.sizes();
     let r = problem.prior_triangle(beta).merged(triangles).r();
     Svd::of(Mat::from_fn(r.nrows(), sizes.len(), |i, j| r[(i, j)] * sizes[j]).as_ref())
@@ -178,7 +179,7 @@ fn directions_at(problem: &Problem, beta: &[f64], triangles: &[Triangle]) -> Res
 
 /// Moves the parameters that are not held until the predictions are those of the fit. Returns the largest remaining
 /// difference, mm.
-fn restore_predictions(problem: &Problem, fit: &Fit, held: &[usize], beta: &mut [f64]) -> Result<f64, IdentifyError> {
+fn restore_predictions(problem: &Problem, fit: &Fit, held: &[usize], beta: &mut [f64]) -> Result<f64, Diagnostic> {
     let sizes = problem.parameters.sizes();
     let free: Vec<usize> = (0..sizes.len()).filter(|j| !held.contains(j)).collect();
     // The predictions of the fit in place of the readings.

@@ -22,9 +22,10 @@ use faer::linalg::solvers::{DenseSolveCore, Llt};
 use faer::prelude::Solve;
 use faer::{Mat, Side};
 
+use abbe_model::Diagnostic;
 use abbe_model::session::Prior;
 
-use crate::error::IdentifyError;
+use crate::error;
 use crate::noise::NoiseSource;
 use crate::numerics::evidence::{NormalEquations, Posterior};
 use crate::numerics::parallel;
@@ -113,7 +114,7 @@ impl FoldEquations {
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
-    pub fn of(problem: &Problem, beta: &[f64]) -> Result<FoldEquations, IdentifyError> {
+    pub fn of(problem: &Problem, beta: &[f64]) -> Result<FoldEquations, Diagnostic> {
         let list = &problem.parameters.list;
         let count = list.len();
         let families = families(&problem.parameters);
@@ -220,7 +221,7 @@ impl FoldEquations {
     ///
     /// # Errors
     /// If the equations are not positive definite.
-    pub fn held_out_at_present(&self, problem: &Problem) -> Result<Vec<f64>, IdentifyError> {
+    pub fn held_out_at_present(&self, problem: &Problem) -> Result<Vec<f64>, Diagnostic> {
         let precisions = self.precisions(problem);
         let of_folds =
             parallel::map(self.folds.len(), &|k| Ok(self.residual_without(k, PRESENT_VARIANCE, &precisions)?.0));
@@ -234,7 +235,7 @@ impl FoldEquations {
 
     /// For each fold, the sum of squares of its residual under the model without it, and the sum of its variances from
     /// the parameters.
-    fn held_out(&self, variance: f64, precisions: &[f64]) -> Result<Vec<(f64, f64)>, IdentifyError> {
+    fn held_out(&self, variance: f64, precisions: &[f64]) -> Result<Vec<(f64, f64)>, Diagnostic> {
         let of_folds = parallel::map(self.folds.len(), &|k| self.without(k, variance, precisions));
         of_folds.into_iter().collect()
     }
@@ -249,7 +250,7 @@ impl FoldEquations {
     ///
     /// # Errors
     /// If the equations are not positive definite.
-    pub fn with_effect(&self, least: f64) -> Result<Vec<usize>, IdentifyError> {
+    pub fn with_effect(&self, least: f64) -> Result<Vec<usize>, Diagnostic> {
         let start = vec![WIDE_PRECISION; self.equations.families.len()];
         let posterior = self.equations.posterior(FIRST_INFLATION, &start)?;
         let families = posterior.effective.iter().enumerate();
@@ -257,7 +258,7 @@ impl FoldEquations {
     }
 
     /// Sum of squares of a fold's residual under the model without it, and the sum of its variances from the parameters.
-    fn without(&self, k: usize, variance: f64, precisions: &[f64]) -> Result<(f64, f64), IdentifyError> {
+    fn without(&self, k: usize, variance: f64, precisions: &[f64]) -> Result<(f64, f64), Diagnostic> {
         let (square, factor) = self.residual_without(k, variance, precisions)?;
         let (gram, covariance) = (&self.folds[k].products.gram, factor.inverse());
         // tr J C Jᵀ
@@ -268,10 +269,10 @@ impl FoldEquations {
 
     /// Sum of squares of a fold's residual under the model without it, and the Cholesky factor of the information of that
     /// model.
-    fn residual_without(&self, k: usize, variance: f64, precisions: &[f64]) -> Result<(f64, Llt<f64>), IdentifyError> {
+    fn residual_without(&self, k: usize, variance: f64, precisions: &[f64]) -> Result<(f64, Llt<f64>), Diagnostic> {
         let fold = &self.folds[k].products;
         let information = self.equations.information(variance, precisions) - &fold.gram * faer::Scale(1.0 / variance);
-        let factor = information.llt(Side::Lower).map_err(|_| IdentifyError::Decomposition)?;
+        let factor = information.llt(Side::Lower).map_err(|_| error::decomposition())?;
         let right = self.equations.right_side(variance);
         let right = Mat::from_fn(right.len(), 1, |j, _| right[j] - fold.projection[j] / variance);
         Ok((fold.residual_square(factor.solve(&right).col_as_slice(0)), factor))

@@ -15,11 +15,11 @@
 //! u² = u₀² + Σ_p w(p)·δ(p)²·E[h²|p],    w(p) = B(p)/n / (1 + B̄)
 //! ```
 
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 
 use super::positions::Projection;
 use super::{Fit, Problem};
-use crate::error::IdentifyError;
 use crate::numerics::regression::dot;
 use crate::parameters::Role;
 
@@ -30,7 +30,7 @@ const PLACES: usize = 64;
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub(super) fn at_solution(problem: &Problem, fit: &Fit) -> Result<Vec<(f64, Vec<f64>)>, IdentifyError> {
+pub(super) fn at_solution(problem: &Problem, fit: &Fit) -> Result<Vec<(f64, Vec<f64>)>, Diagnostic> {
     let parameters = &problem.parameters;
     let mut wide = problem.clone();
     let mut added = Vec::new();
@@ -94,7 +94,7 @@ pub(super) fn at_solution(problem: &Problem, fit: &Fit) -> Result<Vec<(f64, Vec<
 }
 
 /// Positions of a further step of an effect: away from the intervals in which its own steps lie.
-fn places(problem: &Problem, fit: &Fit, effect: usize) -> Result<Vec<f64>, IdentifyError> {
+fn places(problem: &Problem, fit: &Fit, effect: usize) -> Result<Vec<f64>, Diagnostic> {
     let own = &problem.parameters.effects[effect];
     let levels = problem.levels(own)?;
     let (Some(low), Some(high)) = (levels.first(), levels.last()) else { return Ok(Vec::new()) };

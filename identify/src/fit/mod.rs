@@ -22,11 +22,11 @@ pub mod tpoint;
 
 use std::cell::RefCell;
 
+use abbe_model::Diagnostic;
 use abbe_model::session::Prior;
 use abbe_model::words::listed;
 use faer::Mat;
 
-use crate::error::IdentifyError;
 use crate::heldout::{HeldOut, held_out};
 use crate::noise::{NoiseSource, PureError, ShownNoise};
 use crate::numerics::least_squares::{LeastSquares, Scaling, minimise};
@@ -96,12 +96,15 @@ struct IdentifiableDirections<'p> {
     last: RefCell<(Vec<f64>, Vec<Triangle>)>,
 }
 
+/// Number of parameters that a message about the iterations names.
+const MAX_NAMED: usize = 3;
+
 impl LeastSquares for IdentifiableDirections<'_> {
     fn parameters(&self) -> usize {
         self.rank.identifiable_basis.ncols()
     }
 
-    fn linearise(&self, z: &[f64]) -> Result<Triangle, IdentifyError> {
+    fn linearise(&self, z: &[f64]) -> Result<Triangle, Diagnostic> {
         let beta = self.rank.parameters_at(z);
         if self.last.borrow().0 != beta {
             let triangles = self.problem.triangles(&beta)?;
@@ -118,13 +121,32 @@ impl LeastSquares for IdentifiableDirections<'_> {
     fn degrees_of_freedom(&self) -> f64 {
         freedom(self.problem, self.rank).max(1) as f64
     }
+
+    /// The largest step against its physical size first.
+    fn still_moved(&self, step: &[f64]) -> String {
+        let list = &self.problem.parameters.list;
+        let mut moved: Vec<(f64, &str)> = (self.rank.parameters_at(step).iter().zip(list))
+            .map(|(step, parameter)| ((step / parameter.size).abs(), parameter.id.as_str()))
+            .filter(|(share, _)| *share > 0.0)
+            .collect();
+        moved.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let names: Vec<&str> = moved.iter().take(MAX_NAMED).map(|(_, id)| *id).collect();
+        match names[..] {
+            [] => String::new(),
+            _ => format!(
+                "; the iterations still move {}, which these readings hardly determine: state their uncertainties, leave errors \
+                 out of `[unknowns]`, or add readings that separate them",
+                listed(&names, "and")
+            ),
+        }
+    }
 }
 
 /// Fits a problem, starting from the nominal machine or from given parameters.
 ///
 /// # Errors
 /// If there are no parameters, the model cannot be evaluated, or the iterations do not converge.
-pub fn fit(problem: &Problem, start: Option<&[f64]>) -> Result<Fit, IdentifyError> {
+pub fn fit(problem: &Problem, start: Option<&[f64]>) -> Result<Fit, Diagnostic> {
     finish(problem, minimum(problem, start)?)
 }
 
@@ -153,13 +175,13 @@ const LINEAR: f64 = 1e-5;
 ///
 /// # Errors
 /// If the model cannot be evaluated, or the iterations do not converge.
-pub fn minimum(problem: &Problem, start: Option<&[f64]>) -> Result<Minimum, IdentifyError> {
+pub fn minimum(problem: &Problem, start: Option<&[f64]>) -> Result<Minimum, Diagnostic> {
     minimum_beside(problem, start, None)
 }
 
 /// The same after a change of noise and outliers alone, which leaves the rank of the fit `before` where all parameters are
 /// well determined. The linearisation at the nominal machine is spared then.
-fn minimum_beside(problem: &Problem, start: Option<&[f64]>, before: Option<&Fit>) -> Result<Minimum, IdentifyError> {
+fn minimum_beside(problem: &Problem, start: Option<&[f64]>, before: Option<&Fit>) -> Result<Minimum, Diagnostic> {
     let has_families = !families::families(&problem.parameters).is_empty();
     let is_determined = |rank: &Rank| rank.singular_values.last().is_none_or(|least| *least > IDENTIFIED_BY_ERRORS);
     let again = match before.filter(|before| !has_families && is_determined(&before.rank)) {
@@ -207,7 +229,7 @@ fn minimum_of_rank(
     rank: Rank,
     linearised: (Vec<f64>, Vec<Triangle>),
     start: Option<&[f64]>,
-) -> Result<Minimum, IdentifyError> {
+) -> Result<Minimum, Diagnostic> {
     let count = rank.identifiable_basis.ncols();
     let restricted = IdentifiableDirections { problem, rank: &rank, last: RefCell::new(linearised) };
     let sizes = problem.parameters.sizes();
@@ -215,7 +237,7 @@ fn minimum_of_rank(
     let mut end = None;
     if count > 0 {
         let scale = Scaling::Physical(vec![1.0; count]);
-        let found = minimise(&restricted, &from, &scale).map_err(|error| named(problem, &rank, error))?;
+        let found = minimise(&restricted, &from, &scale)?;
         let last = rank.coordinates(&restricted.last.borrow().0, &sizes);
         if last.iter().zip(&found.x).any(|(last, end)| (end - last).abs() > LINEAR) {
             restricted.linearise(&found.x)?;
@@ -230,31 +252,6 @@ fn minimum_of_rank(
     Ok(Minimum { beta, triangles, rank })
 }
 
-/// Number of parameters that a message about the iterations names.
-const MAX_NAMED: usize = 3;
-
-/// An error of the iterations with the parameters along which they still move, the largest step against its physical size
-/// first.
-fn named(problem: &Problem, rank: &Rank, error: IdentifyError) -> IdentifyError {
-    let IdentifyError::NoConvergence { iterations, sum_of_squares, step, .. } = error else { return error };
-    let list = &problem.parameters.list;
-    let mut moved: Vec<(f64, &str)> = (rank.parameters_at(&step).iter().zip(list))
-        .map(|(step, parameter)| ((step / parameter.size).abs(), parameter.id.as_str()))
-        .filter(|(share, _)| *share > 0.0)
-        .collect();
-    moved.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let names: Vec<&str> = moved.iter().take(MAX_NAMED).map(|(_, id)| *id).collect();
-    let along = match names[..] {
-        [] => String::new(),
-        _ => format!(
-            "; the iterations still move {}, which these readings hardly determine: state their uncertainties, leave errors \
-             out of `[unknowns]`, or add readings that separate them",
-            listed(&names, "and")
-        ),
-    };
-    IdentifyError::NoConvergence { iterations, sum_of_squares, step, along }
-}
-
 /// Degrees of freedom of χ². Each prior counts as an observation.
 fn freedom(problem: &Problem, rank: &Rank) -> usize {
     let determined = rank.identifiable_basis.ncols() + problem.parameters.positions().count();
@@ -264,7 +261,7 @@ fn freedom(problem: &Problem, rank: &Rank) -> usize {
 /// The rank at the nominal machine, and the parameters and triangular factors of its linearisation. The priors of
 /// families determine their coefficients, so the rank is that of the other parameters, and their linearisation is not
 /// computed: there may be hundreds of them.
-fn rank_at_nominal(problem: &Problem) -> Result<(Rank, (Vec<f64>, Vec<Triangle>)), IdentifyError> {
+fn rank_at_nominal(problem: &Problem) -> Result<(Rank, (Vec<f64>, Vec<Triangle>)), Diagnostic> {
     let decided = |problem: &Problem| rank_at(problem, &vec![0.0; problem.parameters.list.len()]);
     if families::families(&problem.parameters).is_empty() {
         return decided(problem);
@@ -285,20 +282,20 @@ fn in_sizes(problem: &Problem, beta: &[f64]) -> Vec<f64> {
 }
 
 /// The rank at some parameters, and the linearisation there.
-fn rank_at(problem: &Problem, beta: &[f64]) -> Result<(Rank, (Vec<f64>, Vec<Triangle>)), IdentifyError> {
+fn rank_at(problem: &Problem, beta: &[f64]) -> Result<(Rank, (Vec<f64>, Vec<Triangle>)), Diagnostic> {
     let triangles = problem.triangles(beta)?;
     let whole = problem.prior_triangle(beta).merged(&triangles);
     Ok((problem.parameters.rank(&whole)?, (beta.to_vec(), triangles)))
 }
 
 /// The parameters with each combination that is not identifiable at its nominal value.
-fn identifiable(problem: &Problem, beta: &[f64]) -> Result<Vec<f64>, IdentifyError> {
+fn identifiable(problem: &Problem, beta: &[f64]) -> Result<Vec<f64>, Diagnostic> {
     let (rank, _) = rank_at_nominal(problem)?;
     Ok(rank.parameters_at(&rank.coordinates(beta, &problem.parameters.sizes())))
 }
 
 /// Computes covariance, residuals, cross-validation and χ² at the solution.
-fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, IdentifyError> {
+fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, Diagnostic> {
     let Minimum { beta, triangles, rank } = minimum;
     let whole = problem.prior_triangle(&beta).merged(&triangles);
     let covariance = whole.covariance(&rank.identifiable_basis)?;

@@ -25,10 +25,11 @@
 //!
 //! If several numbers have such an interval, each adds its part to the others, so that their `u` is at least `h/1.96`.
 
+use abbe_model::Diagnostic;
 use abbe_model::session::Prior;
 
 use super::{Fit, finish, fit, minimum, minimum_beside, positions};
-use crate::error::IdentifyError;
+use crate::error::NO_CONVERGENCE;
 use crate::numerics::tails::QUANTILE_95;
 use crate::parameters::Role;
 use crate::problem::Problem;
@@ -71,7 +72,7 @@ pub struct NumberInterval {
 ///
 /// # Errors
 /// As [`fit`].
-pub(crate) fn fit_with_numbers(problem: &mut Problem, before: Option<&Fit>) -> Result<Fit, IdentifyError> {
+pub(crate) fn fit_with_numbers(problem: &mut Problem, before: Option<&Fit>) -> Result<Fit, Diagnostic> {
     let mut found = at_positions(problem, before.map(|before| before.beta.as_slice()), before)?;
     for _ in 0..MAX_MOVES {
         let Some((mut moved, from)) = positions::moved(problem, &found.beta)? else { break };
@@ -86,7 +87,7 @@ pub(crate) fn fit_with_numbers(problem: &mut Problem, before: Option<&Fit>) -> R
 }
 
 /// The fit with the positions that the shapes have.
-fn at_positions(problem: &mut Problem, start: Option<&[f64]>, before: Option<&Fit>) -> Result<Fit, IdentifyError> {
+fn at_positions(problem: &mut Problem, start: Option<&[f64]>, before: Option<&Fit>) -> Result<Fit, Diagnostic> {
     if !problem.parameters.has_numbers() {
         return finish(problem, minimum_beside(problem, start, before)?);
     }
@@ -101,14 +102,14 @@ fn at_positions(problem: &mut Problem, start: Option<&[f64]>, before: Option<&Fi
     };
     match fit(problem, Some(&from)) {
         Ok(found) if is_settled(&found) => Ok(found),
-        Ok(_) | Err(IdentifyError::NoConvergence { .. }) => held(problem, &from),
-        found => found,
+        Err(error) if error.code != NO_CONVERGENCE => Err(error),
+        _ => held(problem, &from),
     }
 }
 
 /// Takes the changes of the numbers in `start` over, if they lower χ², and linearises the problem there. Returns the
 /// parameters without them.
-fn linearised(problem: &mut Problem, mut start: Vec<f64>) -> Result<Vec<f64>, IdentifyError> {
+fn linearised(problem: &mut Problem, mut start: Vec<f64>) -> Result<Vec<f64>, Diagnostic> {
     let mut unchanged = (problem.clone(), start.clone());
     numbers(problem).for_each(|j| unchanged.1[j] = 0.0);
     unchanged.0.linearise_numbers(&mut unchanged.1)?;
@@ -124,7 +125,7 @@ fn linearised(problem: &mut Problem, mut start: Vec<f64>) -> Result<Vec<f64>, Id
 
 /// The fit with all numbers held, with the covariance of the model in which they are free: no values were found that the
 /// readings prefer.
-fn held(problem: &Problem, from: &[f64]) -> Result<Fit, IdentifyError> {
+fn held(problem: &Problem, from: &[f64]) -> Result<Fit, Diagnostic> {
     let mut held = problem.clone();
     let size = |parameter: usize| problem.parameters.list[parameter].size;
     for parameter in numbers(problem) {
@@ -138,11 +139,11 @@ fn held(problem: &Problem, from: &[f64]) -> Result<Fit, IdentifyError> {
 
 /// Moves the numbers of a problem to their best values, and the parameters with them, from a linearisation at these
 /// parameters.
-fn settle(problem: &mut Problem, from: &mut Vec<f64>) -> Result<(), IdentifyError> {
+fn settle(problem: &mut Problem, from: &mut Vec<f64>) -> Result<(), Diagnostic> {
     let numbers: Vec<usize> = numbers(problem).collect();
     for _ in 0..MAX_ROUNDS {
         let to = match minimum(problem, Some(from)) {
-            Err(IdentifyError::NoConvergence { .. }) => break,
+            Err(error) if error.code == NO_CONVERGENCE => break,
             found => found?.beta,
         };
         let width = |j: usize| problem.parameters.list[j].size;
@@ -178,7 +179,7 @@ fn numbers(problem: &Problem) -> impl Iterator<Item = usize> {
 ///
 /// # Errors
 /// As [`fit`].
-pub(crate) fn intervals(problem: &Problem, fit: &Fit) -> Result<Vec<NumberInterval>, IdentifyError> {
+pub(crate) fn intervals(problem: &Problem, fit: &Fit) -> Result<Vec<NumberInterval>, Diagnostic> {
     let mut found = Vec::new();
     for parameter in numbers(problem) {
         let u = fit.covariance[(parameter, parameter)].max(0.0).sqrt();
@@ -224,12 +225,12 @@ struct Moved {
 
 impl Profile<'_> {
     /// The rise of χ² where the number has changed by this much; `None` if the shape cannot have this number.
-    fn rise(&self, change: f64) -> Result<Option<f64>, IdentifyError> {
+    fn rise(&self, change: f64) -> Result<Option<f64>, Diagnostic> {
         Ok(self.moved(change)?.map(|moved| moved.rise))
     }
 
     /// The point where the number has changed by this much; `None` if the shape cannot have this number.
-    fn moved(&self, change: f64) -> Result<Option<Moved>, IdentifyError> {
+    fn moved(&self, change: f64) -> Result<Option<Moved>, Diagnostic> {
         let mut held = self.problem.clone();
         let parameter = &mut held.parameters.list[self.parameter];
         parameter.prior = Prior::Gaussian(HELD * parameter.size);
@@ -247,7 +248,7 @@ impl Profile<'_> {
 
     /// The point at which χ² has risen by the quantile, on the side of `step`. A residual beyond the noise widens the
     /// interval as it enlarges uncertainties.
-    fn end(&self, step: f64) -> Result<Moved, IdentifyError> {
+    fn end(&self, step: f64) -> Result<Moved, Diagnostic> {
         let wanted = QUANTILE_95 * self.fit.u_enlargement.powi(2);
         let mut inside = Moved { change: 0.0, rise: 0.0, of_all: vec![0.0; self.fit.beta.len()] };
         let mut outside = None;

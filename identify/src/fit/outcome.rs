@@ -1,11 +1,11 @@
 //! What a fit is worth: its residual against the noise, what determines its estimates, what it assumes.
 
+use abbe_model::Diagnostic;
 use abbe_model::instrument::Checked;
 use abbe_model::session::{Prior, Test};
 use abbe_model::words::counted;
 
 use super::{BIRGE_SIGNIFICANCE, Fit, assume};
-use crate::error::IdentifyError;
 use crate::identifiability::determined_by_prior;
 use crate::linear::{Linearisation, is_of_interest};
 use crate::noise::{NoiseSource, stated_against_repeats};
@@ -77,7 +77,7 @@ impl Determined {
     ///
     /// # Errors
     /// If the model cannot be evaluated.
-    pub fn of(problem: &Problem, rank: &Rank) -> Result<Determined, IdentifyError> {
+    pub fn of(problem: &Problem, rank: &Rank) -> Result<Determined, Diagnostic> {
         let list = &problem.parameters.list;
         let of_null_space = |j: usize| {
             let own: Vec<&Vec<f64>> = rank.null_combinations.iter().filter(|row| row[j] != 0.0).collect();

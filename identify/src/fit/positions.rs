@@ -16,11 +16,11 @@
 //! u² = u₀² + Σ_p w(p) (β(p) − β)²,    w(p) ∝ Δp·exp(−χ²(p)/2)
 //! ```
 
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 use faer::Mat;
 
 use super::{Fit, Problem};
-use crate::error::IdentifyError;
 use crate::numerics::regression::dot;
 use crate::numerics::solve::Svd;
 use crate::numerics::tails::QUANTILE_95;
@@ -89,7 +89,7 @@ pub(super) struct Projection {
 
 impl Projection {
     /// Of the columns of these numbers, for parameters of these sizes.
-    pub fn of(r: &Mat<f64>, sizes: &[f64], columns: Vec<usize>) -> Result<Projection, IdentifyError> {
+    pub fn of(r: &Mat<f64>, sizes: &[f64], columns: Vec<usize>) -> Result<Projection, Diagnostic> {
         let scaled = Mat::from_fn(r.nrows(), columns.len(), |i, k| r[(i, columns[k])] * sizes[columns[k]]);
         let svd = Svd::of(scaled.as_ref())?;
         let rank = svd.identifiable_rank();
@@ -155,7 +155,7 @@ fn between(low: usize, high: usize) -> Vec<usize> {
 }
 
 /// The levels of each effect whose positions are estimated; empty for others.
-fn levels(problem: &Problem) -> Result<Vec<Vec<f64>>, IdentifyError> {
+fn levels(problem: &Problem) -> Result<Vec<Vec<f64>>, Diagnostic> {
     let own = |effect: &Effect| if effect.positions_estimated { problem.levels(effect) } else { Ok(Vec::new()) };
     problem.parameters.effects.iter().map(own).collect()
 }
@@ -184,7 +184,7 @@ fn profiles(
     beta: &[f64],
     steps: &[Step<'_>],
     gaps: &[Vec<usize>],
-) -> Result<Vec<Vec<Moved>>, IdentifyError> {
+) -> Result<Vec<Vec<Moved>>, Diagnostic> {
     let mut wide = problem.clone();
     let mut firsts = Vec::with_capacity(steps.len());
     let mut added: Vec<(Effect, usize)> = Vec::new();
@@ -247,7 +247,7 @@ fn least(profile: &[Moved]) -> Option<usize> {
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub(super) fn moved(problem: &Problem, beta: &[f64]) -> Result<Option<(Problem, Vec<f64>)>, IdentifyError> {
+pub(super) fn moved(problem: &Problem, beta: &[f64]) -> Result<Option<(Problem, Vec<f64>)>, Diagnostic> {
     let levels = levels(problem)?;
     let steps = steps(problem, &levels);
     if steps.is_empty() {
@@ -283,7 +283,7 @@ pub(super) fn moved(problem: &Problem, beta: &[f64]) -> Result<Option<(Problem, 
 ///
 /// # Errors
 /// If the data lack the column of the driver.
-pub(super) fn centre(problem: &mut Problem) -> Result<(), IdentifyError> {
+pub(super) fn centre(problem: &mut Problem) -> Result<(), Diagnostic> {
     let levels = levels(problem)?;
     let steps = steps(problem, &levels);
     let centred = steps.iter().filter_map(|step| {
@@ -316,7 +316,7 @@ fn refine(
     steps: &[Step<'_>],
     found: &mut [Vec<Moved>],
     wanted: impl Fn(&Step<'_>, &[Moved]) -> Vec<usize>,
-) -> Result<(), IdentifyError> {
+) -> Result<(), Diagnostic> {
     for _ in 0..MAX_PASSES {
         let gaps: Vec<Vec<usize>> = steps.iter().zip(&*found).map(|(step, profile)| wanted(step, profile)).collect();
         if gaps.iter().all(Vec::is_empty) {
@@ -334,7 +334,7 @@ fn refine(
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub(super) fn at_solution(problem: &Problem, fit: &Fit) -> Result<Vec<StepPosition>, IdentifyError> {
+pub(super) fn at_solution(problem: &Problem, fit: &Fit) -> Result<Vec<StepPosition>, Diagnostic> {
     let levels = levels(problem)?;
     let steps = steps(problem, &levels);
     if steps.is_empty() {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 use abbe_model::session::limits::MIN_UM;
@@ -10,7 +11,6 @@ use faer::Mat;
 use super::families::{FoldEquations, Scales, families};
 use super::numbers::{fit_with_numbers, intervals};
 use super::{Fit, further_steps, positions};
-use crate::error::IdentifyError;
 use crate::heldout::{rms_by_unit_mm, rms_mm};
 use crate::noise::{self, Noise, NoiseSource, PureError, ShownNoise, outliers};
 use crate::numerics::solve::Svd;
@@ -35,7 +35,7 @@ const COEFFICIENT_TOLERANCE: f64 = 1e-3;
 ///
 /// # Errors
 /// See [`Problem::new`]; also if the iterations do not converge.
-pub fn prepare(session: &Session, seed: u64) -> Result<(Problem, Fit), IdentifyError> {
+pub fn prepare(session: &Session, seed: u64) -> Result<(Problem, Fit), Diagnostic> {
     prepare_with(session, &[], seed)
 }
 
@@ -44,7 +44,7 @@ pub fn prepare(session: &Session, seed: u64) -> Result<(Problem, Fit), IdentifyE
 ///
 /// # Errors
 /// See [`prepare`].
-pub fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), IdentifyError> {
+pub fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), Diagnostic> {
     let (problem, mut fit) = prepare_at_noise(session, effects, seed)?;
     fit.intervals = intervals(&problem, &fit)?;
     fit.positions = positions::at_solution(&problem, &fit)?;
@@ -56,7 +56,7 @@ pub fn prepare_with(session: &Session, effects: &[Effect], seed: u64) -> Result<
 ///
 /// # Errors
 /// If the iterations do not converge.
-pub fn refit(problem: &mut Problem, present: &Fit) -> Result<Fit, IdentifyError> {
+pub fn refit(problem: &mut Problem, present: &Fit) -> Result<Fit, Diagnostic> {
     let mut fit = fit_with_numbers(problem, Some(present))?;
     fit.intervals = intervals(problem, &fit)?;
     fit.positions = positions::at_solution(problem, &fit)?;
@@ -64,7 +64,7 @@ pub fn refit(problem: &mut Problem, present: &Fit) -> Result<Fit, IdentifyError>
     Ok(fit)
 }
 
-fn prepare_at_noise(session: &Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), IdentifyError> {
+fn prepare_at_noise(session: &Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), Diagnostic> {
     if session.is_lever_known() {
         return prepare_at_lever(session, effects, seed);
     }
@@ -94,7 +94,7 @@ const LEVER_TOLERANCE: f64 = 0.01;
 ///
 /// # Errors
 /// See [`prepare`].
-pub fn with_lever(session: &Session, seed: u64) -> Result<Session, IdentifyError> {
+pub fn with_lever(session: &Session, seed: u64) -> Result<Session, Diagnostic> {
     if session.is_lever_known() {
         return Ok(session.clone());
     }
@@ -133,7 +133,7 @@ fn lengths_over_angles(problem: &Problem, fit: &Fit) -> Option<f64> {
     (lengths > 0.0 && angles > 0.0).then(|| lengths / angles)
 }
 
-fn prepare_at_lever(session: &Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), IdentifyError> {
+fn prepare_at_lever(session: &Session, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), Diagnostic> {
     let stated = session.stated_noise_mm();
     let floor = session.resolution_noise_mm();
     let first = match stated {
@@ -160,7 +160,7 @@ fn prepare_at_lever(session: &Session, effects: &[Effect], seed: u64) -> Result<
 }
 
 /// Fits a problem, in turn with its noise and its outliers.
-fn settled(mut problem: Problem, floor: f64) -> Result<(Problem, Fit), IdentifyError> {
+fn settled(mut problem: Problem, floor: f64) -> Result<(Problem, Fit), Diagnostic> {
     if problem.session.stated_noise_mm().is_none() {
         let nominal = problem.residuals(&vec![0.0; problem.parameters.list.len()]);
         let (sigma_mm, source) = match ShownNoise::of(&problem.tests, &nominal, |_, _| true) {
@@ -193,7 +193,7 @@ fn settled(mut problem: Problem, floor: f64) -> Result<(Problem, Fit), IdentifyE
 ///
 /// # Errors
 /// See [`prepare`].
-fn with_families(problem: Problem, start: Vec<f64>) -> Result<(Problem, Fit), IdentifyError> {
+fn with_families(problem: Problem, start: Vec<f64>) -> Result<(Problem, Fit), Diagnostic> {
     // With hundreds of parameters the iterations of a fit take most of the time. The outliers settle without them.
     let (problem, near) = with_families_linearised(problem, start, None)?;
     // From nothing, so that the scales do not depend on what a search has tried.
@@ -226,7 +226,7 @@ pub fn with_families_linearised(
     problem: Problem,
     start: Vec<f64>,
     inflation: Option<f64>,
-) -> Result<(Problem, NearMinimum), IdentifyError> {
+) -> Result<(Problem, NearMinimum), Diagnostic> {
     let has_families = !families(&problem.parameters).is_empty();
     let estimate = FoldEquations::estimate_near;
     in_turn_with_families(problem, start, inflation, estimate, |problem, beta, (held_out_rms_mm, inflation)| {
@@ -247,9 +247,9 @@ fn in_turn_with_families<F>(
     mut problem: Problem,
     mut start: Vec<f64>,
     mut inflation: Option<f64>,
-    estimate: impl Fn(&FoldEquations, &Problem, Option<f64>) -> Result<Scales, IdentifyError>,
-    fit: impl Fn(&Problem, Vec<f64>, (f64, f64)) -> Result<Fitted<F>, IdentifyError>,
-) -> Result<(Problem, F), IdentifyError> {
+    estimate: impl Fn(&FoldEquations, &Problem, Option<f64>) -> Result<Scales, Diagnostic>,
+    fit: impl Fn(&Problem, Vec<f64>, (f64, f64)) -> Result<Fitted<F>, Diagnostic>,
+) -> Result<(Problem, F), Diagnostic> {
     let mut round = 0;
     loop {
         let equations = FoldEquations::of(&problem, &start)?;
@@ -270,7 +270,7 @@ fn in_turn_with_families<F>(
 /// Root mean square of the residual of the nominal machine, mm, after a linearised fit of the set-up quantities. It
 /// serves as the noise in the first decision on the rank. Machine errors are excluded: in a socket session, shrinking
 /// the machine to a point would explain every reading.
-fn nominal_residual_mm(problem: &Problem) -> Result<f64, IdentifyError> {
+fn nominal_residual_mm(problem: &Problem) -> Result<f64, Diagnostic> {
     let list = &problem.parameters.list;
     let nominal = vec![0.0; list.len()];
     let (r, c, rest) = Triangle::new(list.len()).merged(&problem.triangles(&nominal)?).parts();

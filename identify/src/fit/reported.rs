@@ -1,5 +1,6 @@
 //! A fit in the form of its results: display units, words, and the lists of what is not identifiable and of outliers.
 
+use abbe_model::Diagnostic;
 use abbe_model::effect::description::meaning;
 use abbe_model::unit::ARCSEC_PER_RAD;
 
@@ -8,7 +9,6 @@ use super::quantities::{Quantity, quantities, rms_of_waves, slopes_of_rms, u_of_
 use super::{Fit, StepPosition, covariance, enlargement_warning};
 use super::{assume, cover};
 use crate::circular;
-use crate::error::IdentifyError;
 use crate::heldout::cross_validation;
 use crate::heldout::{mislabelled_runs, rms_by_unit_mm, rms_mm};
 use crate::identifiability::weak;
@@ -31,7 +31,7 @@ use crate::unit::ParameterUnit;
 ///
 /// # Errors
 /// If the model cannot be evaluated for the cross-validation.
-pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, IdentifyError> {
+pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, Diagnostic> {
     let plausibility = plausibility::examine(problem, fit);
     let model = model(problem, fit, outcome::goodness(problem, fit), None)?;
     let mut warnings = problem.session.warnings.clone();
@@ -80,7 +80,7 @@ pub fn model(
     fit: &Fit,
     goodness: Goodness,
     judged_by: Option<JudgedBy<'_>>,
-) -> Result<ModelResult, IdentifyError> {
+) -> Result<ModelResult, Diagnostic> {
     let JudgedBy { readings: judged, heldout_mm } =
         judged_by.unwrap_or(JudgedBy { readings: problem, heldout_mm: None });
     let (rms, held, of_angles) = rms_of_units(problem, judged, fit, heldout_mm);

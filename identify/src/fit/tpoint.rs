@@ -18,12 +18,13 @@
 //! The column of a parameter is its sensitivity at the nominal machine. A parameter is a term if the two columns are
 //! proportional, whatever the directions of the axes are.
 
+use abbe_model::Diagnostic;
 use abbe_model::instrument::{Instrument, InstrumentKind};
 use abbe_model::unit::ARCSEC_PER_RAD;
 use faer::Mat;
 
 use super::Fit;
-use crate::error::IdentifyError;
+use crate::error;
 use crate::problem::Problem;
 use crate::results::{PointingTerm, PointingTerms};
 
@@ -38,11 +39,11 @@ const SEPARABLE: f64 = 1e-6;
 ///
 /// # Errors
 /// If the readings are no directions, or the model cannot be evaluated.
-pub fn report(problem: &Problem, fit: &Fit) -> Result<PointingTerms, IdentifyError> {
+pub fn report(problem: &Problem, fit: &Fit) -> Result<PointingTerms, Diagnostic> {
     let names = |test: usize| problem.models[test].channels().iter().map(|channel| channel.name);
     if let Some(other) = (0..problem.tests.len()).find(|test| !names(*test).eq(["across", "up"])) {
         let (found, expected) = (problem.tests[other].station.kind(), InstrumentKind::Pointing);
-        return Err(IdentifyError::OtherInstrument { method: "terms of TPOINT", found, expected });
+        return Err(error::other_instrument("terms of TPOINT", found, expected));
     }
     let (directions, columns) = columns(problem)?;
     let terms = of_parameters(&directions, &columns);
@@ -97,7 +98,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<PointingTerms, IdentifyErr
 
 /// Azimuth and elevation of the commanded line of sight of each reading, rad, and the sensitivity of across and up to each
 /// parameter at the nominal machine, two rows for each reading.
-fn columns(problem: &Problem) -> Result<(Vec<[f64; 2]>, Mat<f64>), IdentifyError> {
+fn columns(problem: &Problem) -> Result<(Vec<[f64; 2]>, Mat<f64>), Diagnostic> {
     let parameters = problem.parameters.list.len();
     let nominal = problem.slot_values(&vec![0.0; parameters]);
     let lever_mm = problem.session.lever_mm;

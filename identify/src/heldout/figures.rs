@@ -7,9 +7,10 @@
 //! | independent poses | random poses | interpolation | no |
 //! | independent poses | blocks of joint space | extrapolation | yes |
 
+use abbe_model::Diagnostic;
+
 use super::left_out_test::{LeftOutTests, left_out_tests};
 use super::{FoldKind, held_out, stated_rms_mm};
-use crate::error::IdentifyError;
 use crate::fit::Fit;
 use crate::problem::Problem;
 use crate::results::{CrossValidation, TestNotLeftOut};
@@ -24,7 +25,7 @@ pub fn cross_validation(
     fit: &Fit,
     deciding_mm: f64,
     judged: &Problem,
-) -> Result<CrossValidation, IdentifyError> {
+) -> Result<CrossValidation, Diagnostic> {
     let in_um = |mm: f64| mm * 1e3;
     let kind = problem.folds.kind;
     let extrapolation = (kind == FoldKind::PoseBlocks).then_some(deciding_mm);
@@ -54,7 +55,7 @@ pub fn cross_validation(
 }
 
 /// The residuals of held-out random poses, if the deciding folds are blocks of joint space.
-fn interpolated(problem: &Problem, fit: &Fit) -> Result<Option<Vec<Vec<f64>>>, IdentifyError> {
+fn interpolated(problem: &Problem, fit: &Fit) -> Result<Option<Vec<Vec<f64>>>, Diagnostic> {
     let Some(folds) = &problem.folds.interpolation else { return Ok(None) };
     let problem = problem.with_folds((**folds).clone());
     let triangles = problem.triangles(&fit.beta)?;

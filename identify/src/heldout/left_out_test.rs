@@ -17,12 +17,13 @@
 //! predictions sum to `tr(K N⁻¹)` in units of the noise variance. If their mean exceeds 1, the other tests do not
 //! identify what the left-out test needs. It is then not judged, and the parameters of the worst direction are named.
 
+use abbe_model::Diagnostic;
 use faer::linalg::solvers::Llt;
 use faer::prelude::Solve;
 use faer::{Mat, Side};
 
 use super::{predicted, stated_rms_mm};
-use crate::error::IdentifyError;
+use crate::error;
 use crate::numerics::parallel;
 use crate::numerics::symmetric::Symmetric;
 use crate::numerics::triangle::Triangle;
@@ -72,7 +73,7 @@ impl LeftOutTests {
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn left_out_tests(problem: &Problem, beta: &[f64]) -> Result<LeftOutTests, IdentifyError> {
+pub fn left_out_tests(problem: &Problem, beta: &[f64]) -> Result<LeftOutTests, Diagnostic> {
     let tests = problem.models.len();
     if tests < 2 {
         return Ok(LeftOutTests { residuals: vec![None; tests], not_left_out: Vec::new() });
@@ -150,8 +151,8 @@ impl Normal {
     }
 }
 
-fn cholesky(matrix: &Mat<f64>) -> Result<Llt<f64>, IdentifyError> {
-    Llt::new(matrix.as_ref(), Side::Lower).map_err(|_| IdentifyError::Decomposition)
+fn cholesky(matrix: &Mat<f64>) -> Result<Llt<f64>, Diagnostic> {
+    Llt::new(matrix.as_ref(), Side::Lower).map_err(|_| error::decomposition())
 }
 
 /// A test to leave out.
@@ -169,7 +170,7 @@ struct LeftOut<'n> {
 impl LeftOut<'_> {
     /// The scaled step to the model that predicts the test, or the parameters that the other tests do not identify.
     /// `parameters` are those on which the readings of the test depend.
-    fn step(&self, parameters: &[usize]) -> Result<Result<Vec<f64>, Vec<usize>>, IdentifyError> {
+    fn step(&self, parameters: &[usize]) -> Result<Result<Vec<f64>, Vec<usize>>, Diagnostic> {
         let others = self.whole.clone().plus(self.of_test, -1.0).with_least_information();
         let information = cholesky(&others.matrix)?;
         let by_others = information.solve(&others.right);

@@ -6,6 +6,7 @@
 
 use std::sync::Arc;
 
+use abbe_model::Diagnostic;
 use abbe_model::component::ErrorName;
 use abbe_model::effect::{Component, Effect};
 use abbe_model::instrument::Station;
@@ -16,7 +17,6 @@ use abbe_model::session::{Prior, Session, Test};
 
 use super::IdentifiedModel;
 use super::errors::{EstimatedErrors, MachineErrors};
-use crate::error::IdentifyError;
 use crate::parameters::{Parameters, Role, SlotContribution};
 
 /// States of the machine at which its errors are evaluated, and the points that gravity loads.
@@ -89,7 +89,7 @@ impl IdentifiedModel {
     ///
     /// # Errors
     /// If the states lack what an effect follows: time, temperature.
-    pub fn contributions(&self, states: &States) -> Result<Vec<SlotContribution>, IdentifyError> {
+    pub fn contributions(&self, states: &States) -> Result<Vec<SlotContribution>, Diagnostic> {
         let parameters = self.at_states(states)?;
         Ok(parameters.contributions.into_iter().flatten().collect())
     }
@@ -98,14 +98,14 @@ impl IdentifiedModel {
     ///
     /// # Errors
     /// As [`IdentifiedModel::contributions`].
-    pub fn errors_at(&self, states: &States) -> Result<SlotValues, IdentifyError> {
+    pub fn errors_at(&self, states: &States) -> Result<SlotValues, Diagnostic> {
         let errors = EstimatedErrors::of_model(self, states.tool_mm, states.table_mm);
         let near = errors.along(&states.readings)?;
         near(&states.readings)
     }
 
     /// The parameters of the machine over some states, without set-up quantities.
-    fn at_states(&self, states: &States) -> Result<Parameters, IdentifyError> {
+    fn at_states(&self, states: &States) -> Result<Parameters, Diagnostic> {
         // A reading that connects both load points is affected by all errors.
         let station = Station::between(states.table_mm, states.tool_mm, 1.0);
         let machine = Arc::new(self.machine.clone());

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use abbe_model::Diagnostic;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::driver::{DriverInput, DriverSample, Reference};
@@ -10,12 +11,12 @@ use abbe_model::instrument::Station;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 
-use crate::error::IdentifyError;
+use crate::error;
 use crate::model_file::IdentifiedModel;
 use crate::parameters::Role;
 
 /// The errors at positions near the commanded ones, by slot of the machine, mm or rad.
-pub type ErrorsNear<'a> = Box<dyn Fn(&Readings) -> Result<SlotValues, IdentifyError> + 'a>;
+pub type ErrorsNear<'a> = Box<dyn Fn(&Readings) -> Result<SlotValues, Diagnostic> + 'a>;
 
 /// The errors of a machine as functions of its axes, and of what else the rows of a file state.
 pub trait MachineErrors: Sync {
@@ -24,7 +25,7 @@ pub trait MachineErrors: Sync {
     ///
     /// # Errors
     /// If the rows lack a column that an error depends on.
-    fn along<'a>(&'a self, commanded: &'a Readings) -> Result<ErrorsNear<'a>, IdentifyError>;
+    fn along<'a>(&'a self, commanded: &'a Readings) -> Result<ErrorsNear<'a>, Diagnostic>;
 
     /// An effect that depends on all rows before, so that the rows cannot be divided into blocks: a first-order lag.
     fn with_history(&self) -> Option<String> {
@@ -91,7 +92,7 @@ impl EstimatedErrors {
         effect: &Effect,
         rows: &Readings,
         model: &TestModel,
-    ) -> Result<Vec<DriverSample<f64>>, IdentifyError> {
+    ) -> Result<Vec<DriverSample<f64>>, Diagnostic> {
         let driver = effect.driver.kind();
         let input = DriverInput {
             machine: &self.machine,
@@ -101,11 +102,13 @@ impl EstimatedErrors {
             component_axis: effect.component.axis(&self.machine),
             lag_s: effect.shape.lag_s(),
         };
-        driver.samples(&input).ok_or_else(|| IdentifyError::MissingDriver {
-            effect: effect.id(),
-            driver: effect.driver.to_string(),
-            test: "the commands".to_string(),
-            column: driver.missing_column(rows).unwrap_or_else(|| effect.driver.to_string()),
+        driver.samples(&input).ok_or_else(|| {
+            error::missing_driver(
+                effect.id(),
+                &effect.driver,
+                "the commands",
+                driver.missing_column(rows).unwrap_or_else(|| effect.driver.to_string()),
+            )
         })
     }
 
@@ -120,7 +123,7 @@ impl MachineErrors for EstimatedErrors {
         lagged.map(|estimated| estimated.effect.id())
     }
 
-    fn along<'a>(&'a self, commanded: &'a Readings) -> Result<ErrorsNear<'a>, IdentifyError> {
+    fn along<'a>(&'a self, commanded: &'a Readings) -> Result<ErrorsNear<'a>, Diagnostic> {
         let model = self.model(commanded);
         let parameters = self.station.kind().unknowns();
         let travel: Vec<Vec<DriverSample<f64>>> = self

@@ -1,11 +1,12 @@
 //! The model of a fit.
 
+use abbe_model::Diagnostic;
 use abbe_model::component::ErrorName;
 use abbe_model::driver::Reference;
 use abbe_model::session::Session;
 
 use super::{IdentifiedModel, ModelParameter, Provenance, motion, range};
-use crate::error::IdentifyError;
+use crate::error;
 use crate::fit::base::{Gauge, base_parameters};
 use crate::fit::{Fit, minimum};
 use crate::heldout::stated_rms_mm;
@@ -18,9 +19,9 @@ impl IdentifiedModel {
     ///
     /// # Errors
     /// If no parameter is identifiable, or the fit of the location errors alone does not converge.
-    pub fn of_fit(problem: &Problem, fit: &Fit, provenance: Provenance) -> Result<IdentifiedModel, IdentifyError> {
+    pub fn of_fit(problem: &Problem, fit: &Fit, provenance: Provenance) -> Result<IdentifiedModel, Diagnostic> {
         if fit.rank.identifiable_basis.ncols() == 0 {
-            return Err(IdentifyError::NothingIdentifiable { lacking: "no model to save" });
+            return Err(error::nothing_identifiable("no model to save"));
         }
         let base = base_parameters(problem, fit, Gauge::OwnDirection)?;
         let list = &problem.parameters.list;
@@ -67,7 +68,7 @@ impl IdentifiedModel {
 }
 
 /// The location errors as the same readings give them without any effect.
-fn locations(problem: &Problem, fit: &Fit) -> Result<Vec<(ErrorName, f64)>, IdentifyError> {
+fn locations(problem: &Problem, fit: &Fit) -> Result<Vec<(ErrorName, f64)>, Diagnostic> {
     let named = |problem: &Problem, beta: &[f64]| {
         let errors = problem.parameters.list.iter().zip(beta).filter(|(parameter, _)| parameter.role == Role::Error);
         errors.filter_map(|(parameter, value)| Some((ErrorName::parse(&parameter.id)?, *value))).collect()

@@ -4,16 +4,16 @@ use std::path::Path;
 
 use abbe_files::Source;
 use abbe_files::read::{effect_of_document, machine_of_document};
-use abbe_model::ModelError;
+use abbe_model::Diagnostic;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
+use abbe_model::diagnostic::Location;
 use abbe_model::document::fault::{Fault, Within};
 use abbe_model::document::kind::Kind;
 use abbe_model::document::value::{Long, Positive};
 use abbe_model::driver::column::TEMPERATURE;
 use abbe_model::driver::{Driver, Reference};
 use abbe_model::effect::Effect;
-use abbe_model::error::Location;
 use abbe_model::instrument::kinds;
 use abbe_model::session::Prior;
 use abbe_model::session::parameters_of;
@@ -23,7 +23,6 @@ use serde_json::Value;
 use super::document::{self, Document, SCHEMA, SCHEMA_VERSION};
 use super::write::{CHECKSUM, checksum};
 use super::{DriverRange, IdentifiedModel, ModelParameter};
-use crate::error::IdentifyError;
 use crate::noise::Noise;
 use crate::numerics::symmetric::Symmetric;
 use crate::parameters::Role;
@@ -42,7 +41,7 @@ const SAVE_AGAIN: &str = "save the model again";
 /// # Errors
 /// If the file cannot be read, is no model, is of a newer version, or was changed by hand: the file, the line, the key,
 /// what was found and what to do.
-pub fn read(path: &Path) -> Result<IdentifiedModel, IdentifyError> {
+pub fn read(path: &Path) -> Result<IdentifiedModel, Diagnostic> {
     Ok(of_source(&abbe_files::text(path, "the model file")?)?)
 }
 
@@ -55,7 +54,7 @@ pub fn is_model(text: &str) -> bool {
 ///
 /// # Errors
 /// As [`read`].
-pub fn of_source(source: &Source) -> Result<IdentifiedModel, ModelError> {
+pub fn of_source(source: &Source) -> Result<IdentifiedModel, Diagnostic> {
     let whole: Value = serde_json::from_str(&source.text).map_err(|cause| not_json(source, &cause))?;
     let parsed = source.json()?;
     let here = |fault: Fault| helped(parsed.error_of(fault));
@@ -72,21 +71,21 @@ pub fn of_source(source: &Source) -> Result<IdentifiedModel, ModelError> {
 }
 
 /// The error with what to do, which is the same about every value that a program wrote.
-fn helped(mut error: ModelError) -> ModelError {
-    if let ModelError::Input { help, .. } = &mut error {
-        help.get_or_insert_with(|| SAVE_AGAIN.to_string());
+fn helped(mut error: Diagnostic) -> Diagnostic {
+    if error.place.is_some() {
+        error.help.get_or_insert_with(|| SAVE_AGAIN.to_string());
     }
     error
 }
 
-fn not_json(source: &Source, cause: &serde_json::Error) -> ModelError {
+fn not_json(source: &Source, cause: &serde_json::Error) -> Diagnostic {
     let is_toml = ["[[test]]", "[machine]", "[axis."].iter().any(|header| source.text.contains(header));
     let (location, message) = if is_toml {
         (Location::file(&source.file), "this is a session or machine file, not a model".to_string())
     } else {
         (Location::line(&source.file, cause.line()), format!("not valid JSON: {cause}"))
     };
-    ModelError::Input { location, message, help: Some(ANOTHER.to_string()) }
+    Diagnostic::input(location, message, ANOTHER)
 }
 
 /// Checks that it is a model of a version that can be read.

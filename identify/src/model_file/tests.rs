@@ -2,7 +2,7 @@ use std::path::Path;
 
 use abbe_files::ReadOptions;
 use abbe_files::read::effect_of_document;
-use abbe_model::ModelError;
+use abbe_model::Diagnostic;
 use abbe_model::document::effect;
 use abbe_model::document::node::Named;
 use abbe_model::driver::Driver;
@@ -38,7 +38,7 @@ fn text() -> String {
     IdentifiedModel::of_fit(&problem, &fit, Provenance::default()).unwrap().to_text().unwrap()
 }
 
-fn read_text(text: &str) -> Result<IdentifiedModel, ModelError> {
+fn read_text(text: &str) -> Result<IdentifiedModel, Diagnostic> {
     of_source(&abbe_files::Source::new(Path::new("model.json"), text))
 }
 

@@ -1,5 +1,6 @@
 //! A model as a JSON text.
 
+use abbe_model::Diagnostic;
 use abbe_model::document::kind::Kind;
 use abbe_model::document::of_domain;
 use abbe_model::document::value::{Long, Positive};
@@ -10,7 +11,7 @@ use sha2::{Digest, Sha256};
 
 use super::IdentifiedModel;
 use super::document::{self, Document, SCHEMA, SCHEMA_VERSION};
-use crate::error::IdentifyError;
+use crate::error;
 use crate::parameters::Role;
 
 /// The key of the checksum.
@@ -21,8 +22,8 @@ impl IdentifiedModel {
     ///
     /// # Errors
     /// If a number of the model is not finite.
-    pub fn to_text(&self) -> Result<String, IdentifyError> {
-        let fault = |cause: serde_json::Error| IdentifyError::Write { what: "the model", cause: cause.into() };
+    pub fn to_text(&self) -> Result<String, Diagnostic> {
+        let fault = |cause: serde_json::Error| error::not_written("the model", cause);
         let finite = self.covariance.is_all_finite() && self.parameters.iter().all(|p| p.value.is_finite());
         if !finite {
             return Err(fault(serde::ser::Error::custom("a value or an uncertainty is not finite")));

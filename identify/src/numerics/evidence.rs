@@ -13,12 +13,13 @@
 //! steps on `ln α` use the exact second derivatives; where these are not concave, MacKay's fixed point
 //! `α_f = γ_f/‖b_f‖²` replaces the step. Steps that do not raise `ln Z` are halved, so the iteration is monotone.
 
+use abbe_model::Diagnostic;
 use faer::linalg::solvers::DenseSolveCore;
 use faer::prelude::Solve;
 use faer::{Mat, Side};
 
 use super::products::NormalProducts;
-use crate::error::IdentifyError;
+use crate::error;
 
 /// The normal equations of readings of unit variance, the fixed priors, and the families.
 #[derive(Clone, Debug)]
@@ -86,10 +87,10 @@ impl NormalEquations {
     ///
     /// # Errors
     /// If the normal equations are not positive definite.
-    pub fn posterior(&self, variance: f64, precisions: &[f64]) -> Result<Posterior, IdentifyError> {
+    pub fn posterior(&self, variance: f64, precisions: &[f64]) -> Result<Posterior, Diagnostic> {
         let information = self.information(variance, precisions);
         let count = information.nrows();
-        let factor = information.llt(Side::Lower).map_err(|_| IdentifyError::Decomposition)?;
+        let factor = information.llt(Side::Lower).map_err(|_| error::decomposition())?;
         let right = self.right_side(variance);
         let column = Mat::from_fn(count, 1, |i, _| right[i]);
         let mean: Vec<f64> = factor.solve(&column).col(0).iter().copied().collect();
@@ -123,7 +124,7 @@ impl NormalEquations {
     ///
     /// # Errors
     /// If the normal equations are not positive definite.
-    pub fn maximise(&self, variance: f64, start: &[f64]) -> Result<(Vec<f64>, Posterior), IdentifyError> {
+    pub fn maximise(&self, variance: f64, start: &[f64]) -> Result<(Vec<f64>, Posterior), Diagnostic> {
         let mut precisions = start.to_vec();
         let mut present = self.posterior(variance, &precisions)?;
         for _ in 0..MAX_STEPS {

@@ -14,11 +14,12 @@
 //! `JᵀJ`. Each full step is then `q` times the step before with `q` close to 1, or close to −1 if it goes too far. The sum
 //! of all further steps, `1/(1 − q)` times the present one, leads to the minimum (Aitken's extrapolation).
 
+use abbe_model::Diagnostic;
 use faer::Mat;
 
 use super::solve::Svd;
 use super::triangle::Triangle;
-use crate::error::IdentifyError;
+use crate::error::NO_CONVERGENCE;
 
 /// A problem `min ‖r(x)‖²`.
 pub trait LeastSquares {
@@ -29,11 +30,16 @@ pub trait LeastSquares {
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
-    fn linearise(&self, x: &[f64]) -> Result<Triangle, IdentifyError>;
+    fn linearise(&self, x: &[f64]) -> Result<Triangle, Diagnostic>;
     /// `‖r(x)‖²`; not finite if the model cannot be evaluated.
     fn sum_of_squares(&self, x: &[f64]) -> f64;
     /// Degrees of freedom of `‖r‖²`, at least 1.
     fn degrees_of_freedom(&self) -> f64;
+    /// The parameters that a step still moves, in words, for the message that the iterations do not converge.
+    fn still_moved(&self, step: &[f64]) -> String {
+        let _ = step;
+        String::new()
+    }
 }
 
 /// The scale of each parameter.
@@ -88,7 +94,7 @@ pub fn minimise(
     problem: &impl LeastSquares,
     start: &[f64],
     scaling: &Scaling,
-) -> Result<LeastSquaresSolution, IdentifyError> {
+) -> Result<LeastSquaresSolution, Diagnostic> {
     let n = problem.parameters();
     let mut x = start.to_vec();
     let mut triangle = problem.linearise(&x)?;
@@ -172,13 +178,15 @@ pub fn minimise(
     if directions.explained(&c) < NEGLIGIBLE * current / problem.degrees_of_freedom() {
         return Ok(LeastSquaresSolution { x, triangle, sum_of_squares: current, iterations: MAX_ITERATIONS });
     }
-    let step = directions.solve(&c, 0.0).iter().zip(&scale).map(|(step, scale)| step * scale).collect();
-    Err(IdentifyError::NoConvergence {
-        iterations: MAX_ITERATIONS,
-        sum_of_squares: current,
-        step,
-        along: String::new(),
-    })
+    let step: Vec<f64> = directions.solve(&c, 0.0).iter().zip(&scale).map(|(step, scale)| step * scale).collect();
+    let along = problem.still_moved(&step);
+    Err(Diagnostic::coded(
+        NO_CONVERGENCE,
+        format!(
+            "no convergence after {MAX_ITERATIONS} iterations (the sum of squares is {current:.3e}){along}; check that the \
+             readings belong to this machine and that the nominal geometry is right"
+        ),
+    ))
 }
 
 /// The scales as the reciprocals of the largest column norms so far.
@@ -271,7 +279,7 @@ mod tests {
             2
         }
 
-        fn linearise(&self, x: &[f64]) -> Result<Triangle, IdentifyError> {
+        fn linearise(&self, x: &[f64]) -> Result<Triangle, Diagnostic> {
             Ok(Triangle::of(Poorly::rows(x)))
         }
 
@@ -318,7 +326,7 @@ mod tests {
             1
         }
 
-        fn linearise(&self, x: &[f64]) -> Result<Triangle, IdentifyError> {
+        fn linearise(&self, x: &[f64]) -> Result<Triangle, Diagnostic> {
             Ok(Triangle::of(self.rows(x[0])))
         }
 

@@ -17,13 +17,13 @@
 //! The null space is reported in reduced row echelon form (`null_space`), in an order of preference of the
 //! parameters that follows from their identifiers.
 
+use abbe_model::Diagnostic;
 use faer::Mat;
 
 use super::null_space::{MIN_PIVOT, combinations};
 use super::solve::Svd;
 use super::tolerances::{COLLINEAR, MIN_IDENTIFIABLE, ROUNDING_OF_COMBINATIONS};
 use super::triangle::Triangle;
-use crate::error::IdentifyError;
 
 /// The identifiable and the null directions of a problem.
 #[derive(Clone, Debug)]
@@ -53,7 +53,7 @@ impl Rank {
     ///
     /// # Errors
     /// If the factor has entries that are not finite.
-    pub fn decide(triangle: &Triangle, size: &[f64], preference: &[usize]) -> Result<Rank, IdentifyError> {
+    pub fn decide(triangle: &Triangle, size: &[f64], preference: &[usize]) -> Result<Rank, Diagnostic> {
         Rank::decide_above(triangle, size, preference, (MIN_IDENTIFIABLE, 0))
     }
 
@@ -66,7 +66,7 @@ impl Rank {
         size: &[f64],
         preference: &[usize],
         (least, at_least): (f64, usize),
-    ) -> Result<Rank, IdentifyError> {
+    ) -> Result<Rank, Diagnostic> {
         let n = size.len();
         let r = triangle.r();
         let scaled = Mat::from_fn(n, n, |i, j| r[(i, j)] * size[j]);
@@ -98,7 +98,7 @@ impl Rank {
     ///
     /// # Errors
     /// If the null space has entries that are not finite.
-    pub fn with_set_up_first(mut self, is_set_up: &[bool], size: &[f64]) -> Result<Rank, IdentifyError> {
+    pub fn with_set_up_first(mut self, is_set_up: &[bool], size: &[f64]) -> Result<Rank, Diagnostic> {
         let structural = self.structural;
         let n = size.len();
         let others: Vec<usize> = (0..n).filter(|j| !is_set_up[*j]).collect();

@@ -1,11 +1,11 @@
 //! A triangular factor in fewer directions: restricted to a subspace, or with parameters eliminated; and the
 //! covariance that it gives.
 
+use abbe_model::Diagnostic;
 use faer::{Mat, MatRef};
 
 use super::solve::Svd;
 use super::triangle::{Triangle, upper};
-use crate::error::IdentifyError;
 
 impl Triangle {
     /// The factor of `[J·N | r]`, with the columns of `N` as directions.
@@ -25,7 +25,7 @@ impl Triangle {
     ///
     /// # Errors
     /// If the factor has entries that are not finite.
-    pub fn covariance(&self, basis: &Mat<f64>) -> Result<Mat<f64>, IdentifyError> {
+    pub fn covariance(&self, basis: &Mat<f64>) -> Result<Mat<f64>, Diagnostic> {
         let root = basis * Svd::of((self.r() * basis).as_ref())?.inverse_root();
         Ok(&root * root.transpose())
     }
@@ -39,7 +39,7 @@ impl Triangle {
     ///
     /// # Errors
     /// If the factor has entries that are not finite.
-    pub fn marginal(&self, kept: &[usize], size: &[f64]) -> Result<Mat<f64>, IdentifyError> {
+    pub fn marginal(&self, kept: &[usize], size: &[f64]) -> Result<Mat<f64>, Diagnostic> {
         let r = self.r();
         let rows = Mat::from_fn(r.nrows(), kept.len(), |i, j| r[(i, kept[j])]);
         Ok(upper(without_dropped(&r, rows, kept, size)?))
@@ -50,7 +50,7 @@ impl Triangle {
     ///
     /// # Errors
     /// If the factor has entries that are not finite.
-    pub fn eliminated(&self, kept: &[usize], size: &[f64]) -> Result<Triangle, IdentifyError> {
+    pub fn eliminated(&self, kept: &[usize], size: &[f64]) -> Result<Triangle, Diagnostic> {
         let (r, c, rest) = self.parts();
         let rows = Mat::from_fn(r.nrows(), kept.len() + 1, |i, j| kept.get(j).map_or(c[i], |kept| r[(i, *kept)]));
         let mut triangle = Triangle::of(without_dropped(&r, rows, kept, size)?);
@@ -62,7 +62,7 @@ impl Triangle {
 }
 
 /// The rows with the column space of the parameters that are not `kept` projected out, as far as it is identifiable.
-fn without_dropped(r: &Mat<f64>, mut rows: Mat<f64>, kept: &[usize], size: &[f64]) -> Result<Mat<f64>, IdentifyError> {
+fn without_dropped(r: &Mat<f64>, mut rows: Mat<f64>, kept: &[usize], size: &[f64]) -> Result<Mat<f64>, Diagnostic> {
     let dropped: Vec<usize> = (0..size.len()).filter(|j| !kept.contains(j)).collect();
     let scaled = Mat::from_fn(r.nrows(), dropped.len(), |i, j| r[(i, dropped[j])] * size[dropped[j]]);
     let directions = Svd::of(scaled.as_ref())?;

@@ -1,10 +1,11 @@
 //! Solutions of linear systems: the singular values of a matrix, and what follows from them.
 
+use abbe_model::Diagnostic;
 use faer::prelude::Solve;
 use faer::{Mat, MatRef};
 
 use super::tolerances::{MIN_IDENTIFIABLE, ROUNDING};
-use crate::error::IdentifyError;
+use crate::error;
 
 /// A matrix `A = U·S·Vᵀ` with its singular values in descending order.
 pub struct Svd {
@@ -19,16 +20,16 @@ impl Svd {
     ///
     /// # Errors
     /// If the matrix has entries that are not finite.
-    pub fn of(matrix: MatRef<'_, f64>) -> Result<Svd, IdentifyError> {
+    pub fn of(matrix: MatRef<'_, f64>) -> Result<Svd, Diagnostic> {
         if !matrix.is_all_finite() {
-            return Err(IdentifyError::Decomposition);
+            return Err(error::decomposition());
         }
         // The iteration of the decomposition ends without convergence at few finite matrices (one of 39 parameters in some
         // thousand traces). That of the transposed matrix, or of the rows in reverse order, takes another course.
         Svd::directly(matrix)
             .or_else(|| Svd::directly(matrix.transpose()).map(Svd::transposed))
             .or_else(|| Svd::directly(matrix.reverse_rows()).map(Svd::with_reversed_rows))
-            .ok_or(IdentifyError::Decomposition)
+            .ok_or_else(error::decomposition)
     }
 
     fn directly(matrix: MatRef<'_, f64>) -> Option<Svd> {
@@ -175,7 +176,7 @@ mod tests {
         }
         let mut broken = a;
         broken[(2, 1)] = f64::NAN;
-        assert!(matches!(Svd::of(broken.as_ref()), Err(IdentifyError::Decomposition)));
+        assert_eq!(Svd::of(broken.as_ref()).err(), Some(error::decomposition()));
     }
 
     /// The third column is the sum of the first two; of all solutions, the one of least norm is returned. A matrix

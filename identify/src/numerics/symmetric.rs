@@ -1,9 +1,10 @@
 //! Eigenvalues of symmetric matrices.
 
+use abbe_model::Diagnostic;
 use faer::{Mat, MatRef, Side};
 
 use super::tolerances::ROUNDING_OF_SQUARES;
-use crate::error::IdentifyError;
+use crate::error;
 
 /// The eigenvalues of a symmetric matrix in ascending order, and its eigenvectors, one column each.
 pub struct Symmetric {
@@ -18,14 +19,14 @@ impl Symmetric {
     ///
     /// # Errors
     /// If the matrix has entries that are not finite.
-    pub fn of(matrix: MatRef<'_, f64>) -> Result<Symmetric, IdentifyError> {
+    pub fn of(matrix: MatRef<'_, f64>) -> Result<Symmetric, Diagnostic> {
         match matrix.nrows() {
-            0..3 if !matrix.is_all_finite() => Err(IdentifyError::Decomposition),
+            0..3 if !matrix.is_all_finite() => Err(error::decomposition()),
             0 => Ok(Symmetric { values: Vec::new(), vectors: Mat::new() }),
             1 => Ok(Symmetric { values: vec![matrix[(0, 0)]], vectors: Mat::identity(1, 1) }),
             2 => Ok(Symmetric::of_two(matrix)),
             _ => {
-                let eigen = matrix.self_adjoint_eigen(Side::Lower).map_err(|_| IdentifyError::Decomposition)?;
+                let eigen = matrix.self_adjoint_eigen(Side::Lower).map_err(|_| error::decomposition())?;
                 let values = eigen.S().column_vector().iter().copied().collect();
                 Ok(Symmetric { values, vectors: eigen.U().to_owned() })
             }
@@ -65,7 +66,7 @@ pub(crate) fn eigen_of_two(a: f64, b: f64, c: f64) -> [(f64, [f64; 2]); 2] {
 ///
 /// # Errors
 /// If the product has entries that are not finite.
-pub fn pseudo_inverse(gram: MatRef<'_, f64>) -> Result<Mat<f64>, IdentifyError> {
+pub fn pseudo_inverse(gram: MatRef<'_, f64>) -> Result<Mat<f64>, Diagnostic> {
     let Symmetric { values, vectors } = Symmetric::of(gram)?;
     let least = values.iter().fold(0.0_f64, |a, b| a.max(*b)) * ROUNDING_OF_SQUARES;
     let entry = |i: usize, k: usize| if values[k] > least { vectors[(i, k)] / values[k] } else { 0.0 };
@@ -96,7 +97,7 @@ mod tests {
     fn non_finite_entries_are_an_error() {
         for size in 1..4 {
             let gram = Mat::from_fn(size, size, |i, j| if i + j + 1 == size { f64::NAN } else { 1.0 });
-            assert!(matches!(pseudo_inverse(gram.as_ref()), Err(IdentifyError::Decomposition)));
+            assert_eq!(pseudo_inverse(gram.as_ref()).err(), Some(error::decomposition()));
         }
     }
 

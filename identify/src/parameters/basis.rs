@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
+use abbe_model::Diagnostic;
 use abbe_model::driver::{DriverInput, Reference};
 use abbe_model::effect::Effect;
 use abbe_model::sensitivity::TestModel;
 use abbe_model::session::{Session, Test};
 
 use super::SlotContribution;
-use crate::error::IdentifyError;
+use crate::error;
 
 /// The basis functions of an effect over the readings of a test.
 pub(super) struct BasisOverTest {
@@ -31,7 +32,7 @@ impl BasisOverTest {
         model: &TestModel,
         reference: &Reference,
         effect: &Effect,
-    ) -> Result<Option<BasisOverTest>, IdentifyError> {
+    ) -> Result<Option<BasisOverTest>, Diagnostic> {
         let Some(readings) = test.readings.as_ref().filter(|_| effect.acts_in(&test.name)) else { return Ok(None) };
         let driver = effect.driver.kind();
         let input = DriverInput {
@@ -42,11 +43,13 @@ impl BasisOverTest {
             component_axis: effect.component.axis(&session.machine),
             lag_s: effect.shape.lag_s(),
         };
-        let samples = driver.samples(&input).ok_or_else(|| IdentifyError::MissingDriver {
-            effect: effect.id(),
-            driver: effect.driver.to_string(),
-            test: test.name.clone(),
-            column: driver.missing_column(readings).unwrap_or_else(|| effect.driver.to_string()),
+        let samples = driver.samples(&input).ok_or_else(|| {
+            error::missing_driver(
+                effect.id(),
+                &effect.driver,
+                &test.name,
+                driver.missing_column(readings).unwrap_or_else(|| effect.driver.to_string()),
+            )
         })?;
         let effective = model.effective_slots();
         let columns: Vec<Arc<Vec<f64>>> = effect.shape.columns(&samples).into_iter().map(Arc::new).collect();

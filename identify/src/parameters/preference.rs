@@ -1,7 +1,8 @@
 //! The rank over the parameters of a session, and the order of preference of the pivots of its null space.
 
+use abbe_model::Diagnostic;
+
 use super::{Parameter, Parameters, Role};
-use crate::error::IdentifyError;
 use crate::numerics::rank::Rank;
 use crate::numerics::tolerances::MIN_IDENTIFIABLE;
 use crate::numerics::triangle::Triangle;
@@ -16,7 +17,7 @@ impl Parameters {
     ///
     /// # Errors
     /// If the factor has entries that are not finite.
-    pub fn rank(&self, triangle: &Triangle) -> Result<Rank, IdentifyError> {
+    pub fn rank(&self, triangle: &Triangle) -> Result<Rank, Diagnostic> {
         self.rank_above(triangle, (MIN_IDENTIFIABLE, 0))
     }
 
@@ -24,7 +25,7 @@ impl Parameters {
     ///
     /// # Errors
     /// If the factor has entries that are not finite.
-    pub fn rank_above(&self, triangle: &Triangle, least: (f64, usize)) -> Result<Rank, IdentifyError> {
+    pub fn rank_above(&self, triangle: &Triangle, least: (f64, usize)) -> Result<Rank, Diagnostic> {
         let is_set_up: Vec<bool> = self.list.iter().map(|parameter| parameter.role == Role::Setup).collect();
         let sizes = self.sizes();
         Rank::decide_above(triangle, &sizes, &pivot_preference(&self.list), least)?

@@ -22,13 +22,14 @@ mod quick_fit;
 mod results;
 mod suggest;
 
+use abbe_model::Diagnostic;
 use abbe_model::session::Session;
 use abbe_model::unit::{RAD_PER_ARCSEC, Unit};
 use abbe_model::words::first_of;
 pub use pulls::{Pull, Pulls};
 pub use results::{Conflict, ConflictKind, Plausibility, Suggestion, SuggestionKind};
 
-use crate::error::IdentifyError;
+use crate::error::{self, IMPLAUSIBLE, NO_CONVERGENCE};
 use crate::fit::{Fit, ratio_of_another_unit};
 use crate::heldout::{rms_by_unit_mm, rms_mm};
 use crate::noise::NoiseSource;
@@ -85,7 +86,7 @@ fn by_instrument(problem: &Problem, fit: &Fit) -> Plausibility {
 ///
 /// # Errors
 /// If the fit failed, or nothing is identifiable.
-pub(crate) fn checked(problem: &Problem, fit: Result<Fit, IdentifyError>) -> Result<Fit, IdentifyError> {
+pub(crate) fn checked(problem: &Problem, fit: Result<Fit, Diagnostic>) -> Result<Fit, Diagnostic> {
     let mut failed = None;
     let found = match fit {
         // Noise that is stated may well be larger than anything that the tests show.
@@ -103,9 +104,10 @@ pub(crate) fn checked(problem: &Problem, fit: Result<Fit, IdentifyError>) -> Res
             problem.unit().symbol()
         ),
         // The diagnosis takes the place of the advice of this error.
-        Err(error @ IdentifyError::NoConvergence { iterations, sum_of_squares, .. }) => {
+        Err(error) if error.code == NO_CONVERGENCE => {
+            let found = error.message.split("; ").next().unwrap_or_default().to_string();
             failed = Some(error);
-            format!("no convergence after {iterations} iterations (the sum of squares is {sum_of_squares:.3e})")
+            found
         }
         Err(error) => return Err(error),
     };
@@ -115,11 +117,11 @@ pub(crate) fn checked(problem: &Problem, fit: Result<Fit, IdentifyError>) -> Res
         poses::suggestions(problem)
     };
     match (in_words(&suggestions), failed) {
-        (Some(diagnosis), _) => Err(IdentifyError::Contradicted { found, diagnosis }),
+        (Some(diagnosis), _) => Err(error::contradicted(found, diagnosis)),
         (None, Some(error)) => Err(error),
         (None, None) => {
             let check = "check the units, signs and order of the columns, and whether the data belong to this machine";
-            Err(IdentifyError::Contradicted { found, diagnosis: check.to_string() })
+            Err(error::contradicted(found, check))
         }
     }
 }
@@ -129,12 +131,12 @@ pub(crate) fn checked(problem: &Problem, fit: Result<Fit, IdentifyError>) -> Res
 /// remain a warning.
 ///
 /// # Errors
-/// [`IdentifyError::Implausible`] with the conflict and its cause.
-pub fn accepted(found: &Plausibility) -> Result<(), IdentifyError> {
+/// [`IMPLAUSIBLE`] with the conflict and its cause.
+pub fn accepted(found: &Plausibility) -> Result<(), Diagnostic> {
     let conflict = found.conflicts.iter().find(|conflict| conflict.kind == ConflictKind::LocationError);
     match (conflict, in_words(&found.suggestions)) {
         (Some(conflict), Some(diagnosis)) => {
-            Err(IdentifyError::Implausible { found: conflict.words.clone(), diagnosis })
+            Err(Diagnostic::coded(IMPLAUSIBLE, format!("{}; {diagnosis}", conflict.words)))
         }
         _ => Ok(()),
     }

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use abbe_model::Diagnostic;
 use abbe_model::sensitivity::SlotValues;
 use faer::Mat;
 
 use super::{Problem, RowBlock};
-use crate::error::IdentifyError;
 use crate::numerics::parallel;
 use crate::numerics::products::{Products, RowSum};
 use crate::numerics::triangle::Triangle;
@@ -25,7 +25,7 @@ impl Problem {
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
-    pub fn triangles(&self, beta: &[f64]) -> Result<Vec<Triangle>, IdentifyError> {
+    pub fn triangles(&self, beta: &[f64]) -> Result<Vec<Triangle>, Diagnostic> {
         self.sums_of_folds(beta, BLOCKS_OF_FACTORS)
     }
 
@@ -33,11 +33,11 @@ impl Problem {
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
-    pub(crate) fn products(&self, beta: &[f64]) -> Result<Vec<Products>, IdentifyError> {
+    pub(crate) fn products(&self, beta: &[f64]) -> Result<Vec<Products>, Diagnostic> {
         self.sums_of_folds(beta, BLOCKS_OF_PRODUCTS)
     }
 
-    fn sums_of_folds<S: RowSum>(&self, beta: &[f64], blocks_per_segment: usize) -> Result<Vec<S>, IdentifyError> {
+    fn sums_of_folds<S: RowSum>(&self, beta: &[f64], blocks_per_segment: usize) -> Result<Vec<S>, Diagnostic> {
         let values = self.slot_values(beta);
         // Segments have a fixed length, so that the sums do not depend on the number of threads.
         let blocks = self.blocks();
@@ -68,7 +68,7 @@ impl Problem {
         &self,
         values: &[SlotValues],
         blocks: &[RowBlock],
-    ) -> Result<SumsByTestAndFold<S>, IdentifyError> {
+    ) -> Result<SumsByTestAndFold<S>, Diagnostic> {
         let mut sums = SumsByTestAndFold::<S>::new();
         for block in blocks {
             let rows = self.own_rows(&values[block.test], block)?;

@@ -1,9 +1,9 @@
 //! The nonlinear fit of one simulated session, as a function of the deviations of its inputs.
 
+use abbe_model::Diagnostic;
 use abbe_model::session::Prior;
 use faer::Mat;
 
-use crate::error::IdentifyError;
 use crate::fit::{Fit, Quantity, quantities, values_at};
 use crate::monte_carlo::Function;
 use crate::numerics::least_squares::{LeastSquares, Scaling, minimise};
@@ -37,7 +37,7 @@ pub(super) struct Refit<'p> {
 }
 
 impl<'p> Refit<'p> {
-    pub fn new(problem: &'p Problem, fit: &'p Fit) -> Result<Self, IdentifyError> {
+    pub fn new(problem: &'p Problem, fit: &'p Fit) -> Result<Self, Diagnostic> {
         // The factor on uncertainties applies here as in the fit.
         let enlarged = fit.u_enlargement;
         let mut u = Vec::new();
@@ -96,7 +96,7 @@ impl<'p> Refit<'p> {
     }
 
     /// The identifiable coordinates with the best fit to the inputs.
-    fn fitted(&self, deviations: &[f64]) -> Result<Vec<f64>, IdentifyError> {
+    fn fitted(&self, deviations: &[f64]) -> Result<Vec<f64>, Diagnostic> {
         let drawn = SimulatedFit { refit: self, deviations };
         let mut z = self.end.clone();
         for _ in 0..MAX_SHARED_STEPS {
@@ -165,7 +165,7 @@ impl SimulatedFit<'_, '_> {
     }
 
     /// Passes on the parameters of every block's test, and the whitened rows `[J | r]` over these parameters.
-    fn rows(&self, beta: &[f64], mut take: impl FnMut(&[usize], Mat<f64>)) -> Result<(), IdentifyError> {
+    fn rows(&self, beta: &[f64], mut take: impl FnMut(&[usize], Mat<f64>)) -> Result<(), Diagnostic> {
         let problem = self.refit.problem;
         let values = problem.slot_values(beta);
         for block in &self.refit.blocks {
@@ -181,7 +181,7 @@ impl SimulatedFit<'_, '_> {
     }
 
     /// `Nᵀ Jᵀ V⁻¹ r`: the negative gradient of half the sum of squares.
-    fn descent(&self, z: &[f64]) -> Result<Vec<f64>, IdentifyError> {
+    fn descent(&self, z: &[f64]) -> Result<Vec<f64>, Diagnostic> {
         let beta = self.refit.fit.rank.parameters_at(z);
         let count = beta.len();
         let mut whole = vec![0.0; count];
@@ -206,7 +206,7 @@ impl LeastSquares for SimulatedFit<'_, '_> {
         self.refit.end.len()
     }
 
-    fn linearise(&self, z: &[f64]) -> Result<Triangle, IdentifyError> {
+    fn linearise(&self, z: &[f64]) -> Result<Triangle, Diagnostic> {
         let beta = self.refit.fit.rank.parameters_at(z);
         let mut whole = self.prior_triangle(&beta);
         self.rows(&beta, |own, rows| {

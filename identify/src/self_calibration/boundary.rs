@@ -6,10 +6,10 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use abbe_model::Diagnostic;
 use faer::Mat;
 
 use super::equations::{Equations, Function, refused};
-use crate::error::IdentifyError;
 use crate::numerics::rank::Rank;
 use crate::numerics::triangle::Triangle;
 
@@ -29,7 +29,7 @@ pub struct Condition {
 ///
 /// # Errors
 /// If a function has no readings at 0.
-pub fn conditions(equations: &Equations, axis: &str) -> Result<Vec<Condition>, IdentifyError> {
+pub fn conditions(equations: &Equations, axis: &str) -> Result<Vec<Condition>, Diagnostic> {
     let name = |function| equations.name(function, axis);
     let mut conditions = Vec::new();
     for function in Function::ALL {
@@ -84,7 +84,7 @@ const WEIGHT: f64 = 1e6;
 ///
 /// # Errors
 /// If a condition holds a number that is not finite.
-pub fn reduce(columns: usize, conditions: &[Condition]) -> Result<Reduction, IdentifyError> {
+pub fn reduce(columns: usize, conditions: &[Condition]) -> Result<Reduction, Diagnostic> {
     let mut rows = Mat::zeros(conditions.len(), columns + 1);
     for (row, condition) in conditions.iter().enumerate() {
         condition.terms.iter().for_each(|(column, weight)| rows[(row, *column)] += WEIGHT * weight);

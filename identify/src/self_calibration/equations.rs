@@ -1,8 +1,10 @@
 //! Readings of a probe as linear equations in four functions of an angle.
 
 use std::f64::consts::{PI, TAU};
+use std::fmt::Display;
 use std::sync::Arc;
 
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{BodyErrors, ERRORS_PER_AXIS};
 use abbe_model::frames::Point;
@@ -11,7 +13,7 @@ use abbe_model::instrument::probe::{FORM, Probe, RADIUS};
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::{Prior, Session, Test};
 
-use crate::error::IdentifyError;
+use crate::error;
 
 /// The method in its errors.
 const METHOD: &str = "self-calibration";
@@ -119,14 +121,14 @@ impl Equations {
     /// If the session does not fit the method: another instrument, no or several rotary axes that turn under the
     /// artefact, another rotary axis that is not at zero, several artefacts or set-ups, a probing direction that is not
     /// radial, no readings.
-    pub fn of(session: &Session) -> Result<Equations, IdentifyError> {
+    pub fn of(session: &Session) -> Result<Equations, Diagnostic> {
         if let Some(other) = session.tests.iter().find(|test| test.station.probe().is_none()) {
             let (found, expected) = (other.station.kind(), InstrumentKind::Probe);
-            return Err(IdentifyError::OtherInstrument { method: METHOD, found, expected });
+            return Err(error::other_instrument(METHOD, found, expected));
         }
         let tests: Vec<Test> = session.tests.iter().filter(|test| test.readings.is_some()).cloned().collect();
         let Some(first) = tests.first() else {
-            return Err(IdentifyError::NoReadings);
+            return Err(error::no_readings());
         };
         if let Some(other) = tests.iter().find(|test| test.setup != first.setup) {
             return Err(refused(
@@ -194,7 +196,7 @@ impl Equations {
     }
 
     /// The probed points of a test, one per reading.
-    fn touches(&self, session: &Session, test: &Test) -> Result<Vec<TouchEquation>, IdentifyError> {
+    fn touches(&self, session: &Session, test: &Test) -> Result<Vec<TouchEquation>, Diagnostic> {
         let (Some(probe), Some(readings)) = (test.station.probe(), &test.readings) else {
             return Ok(Vec::new());
         };
@@ -280,12 +282,12 @@ struct TouchAngles {
 }
 
 /// The error of a session that does not fit the method.
-pub(super) fn refused(found: impl Into<String>, expected: impl Into<String>) -> IdentifyError {
-    IdentifyError::not_applicable(METHOD, found, expected)
+pub(super) fn refused(found: impl Display, expected: impl Display) -> Diagnostic {
+    error::not_applicable(METHOD, found, expected)
 }
 
 /// The rotary axis that turns under the artefact.
-fn turning_axis(session: &Session, tests: &[Test]) -> Result<usize, IdentifyError> {
+fn turning_axis(session: &Session, tests: &[Test]) -> Result<usize, Diagnostic> {
     let machine = &session.machine;
     let moves = |axis: usize| {
         tests.iter().filter_map(|test| test.readings.as_ref()).any(|readings| {

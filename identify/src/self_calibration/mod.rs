@@ -19,6 +19,7 @@ mod position;
 mod results;
 mod solve;
 
+use abbe_model::Diagnostic;
 use abbe_model::session::{Session, Test};
 
 pub use boundary::{Condition, Reduction, conditions, reduce};
@@ -26,7 +27,6 @@ pub use equations::{Equations, Function, Reference};
 pub use results::{DistributionResult, FunctionPoint, FunctionResult, Histogram, MonteCarloResult, SelfCalibration};
 pub use solve::{CalibrationSolution, rank_before, solve};
 
-use crate::error::IdentifyError;
 use crate::monte_carlo;
 pub use crate::monte_carlo::MonteCarlo;
 use crate::noise::{NoiseSource, PureError};
@@ -64,7 +64,7 @@ const START_NOISE_MM: f64 = 1e-3;
 /// # Errors
 /// See [`Equations::of`] and [`conditions`]; also if the session states no noise and the residual has no degrees of
 /// freedom.
-pub fn calibrate(session: &Session) -> Result<Calibration, IdentifyError> {
+pub fn calibrate(session: &Session) -> Result<Calibration, Diagnostic> {
     let equations = Equations::of(session)?;
     let conditions = conditions(&equations, &session.machine.axes[equations.axis].name)?;
     let reduction = reduce(equations.columns(), &conditions)?;

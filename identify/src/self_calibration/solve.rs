@@ -1,10 +1,10 @@
 //! Linear least-squares solution for the functions' values under the boundary conditions.
 
+use abbe_model::Diagnostic;
 use faer::Mat;
 
 use super::boundary::Reduction;
 use super::equations::{Equations, Reference};
-use crate::error::IdentifyError;
 use crate::numerics::rank::Rank;
 use crate::numerics::solve::Svd;
 use crate::numerics::tolerances::COLLINEAR;
@@ -35,11 +35,7 @@ pub struct CalibrationSolution {
 ///
 /// # Errors
 /// If an equation holds a number that is not finite.
-pub fn solve(
-    equations: &Equations,
-    reduction: &Reduction,
-    sigma_mm: f64,
-) -> Result<CalibrationSolution, IdentifyError> {
+pub fn solve(equations: &Equations, reduction: &Reduction, sigma_mm: f64) -> Result<CalibrationSolution, Diagnostic> {
     let (columns, free) = (equations.columns(), reduction.free.len());
     let radius = usize::from(equations.reference == Reference::Estimated);
     let (outputs, parameters) = (columns + radius, free + radius);
@@ -79,7 +75,7 @@ pub fn solve(
 ///
 /// # Errors
 /// If an equation holds a number that is not finite.
-pub fn rank_before(equations: &Equations) -> Result<usize, IdentifyError> {
+pub fn rank_before(equations: &Equations) -> Result<usize, Diagnostic> {
     let rows = &equations.rows;
     let matrix = Mat::from_fn(rows.len(), equations.columns(), |i, j| rows[i][j]);
     Ok(Svd::of(matrix.as_ref())?.rank(COLLINEAR))

@@ -16,11 +16,11 @@ pub mod places;
 pub mod sensitivities;
 pub mod spectrum;
 
+use abbe_model::Diagnostic;
 use abbe_model::instrument::channel::Channel;
 use abbe_model::sensitivity::TestModel;
 use abbe_model::unit::Unit;
 
-use crate::error::IdentifyError;
 use crate::fit::Fit;
 use crate::heldout::rms_mm;
 use crate::parameters::Role;
@@ -128,7 +128,7 @@ fn shares(problem: &Problem, fit: &Fit) -> Vec<Share> {
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn views(problem: &Problem, fit: &Fit, before_mm: Option<&[Vec<f64>]>) -> Result<SessionSeries, IdentifyError> {
+pub fn views(problem: &Problem, fit: &Fit, before_mm: Option<&[Vec<f64>]>) -> Result<SessionSeries, Diagnostic> {
     let shares = shares(problem, fit);
     let vectors = problem.are_vectors();
     let nominal_mm = problem.residuals(&vec![0.0; fit.beta.len()]);
@@ -169,7 +169,7 @@ pub fn views(problem: &Problem, fit: &Fit, before_mm: Option<&[Vec<f64>]>) -> Re
 }
 
 /// `J_k β_k` of every share, µm, by test.
-fn shares_of_readings(problem: &Problem, fit: &Fit, shares: &[Share]) -> Result<Vec<Vec<Vec<f64>>>, IdentifyError> {
+fn shares_of_readings(problem: &Problem, fit: &Fit, shares: &[Share]) -> Result<Vec<Vec<Vec<f64>>>, Diagnostic> {
     let values = problem.slot_values(&fit.beta);
     let zero = |model: &TestModel| vec![vec![0.0; model.rows() * model.channels().len()]; shares.len()];
     let mut of_tests: Vec<Vec<Vec<f64>>> = problem.models.iter().map(zero).collect();

@@ -4,10 +4,10 @@
 //! Jiang (2014): X. Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis,
 //! University of Birmingham.
 
+use abbe_model::Diagnostic;
 use abbe_model::sensitivity::TestModel;
 
 use super::abscissa::Abscissa;
-use crate::error::IdentifyError;
 use crate::linear::is_of_interest;
 use crate::parameters::Parameter;
 use crate::problem::{Problem, RowBlock};
@@ -47,7 +47,7 @@ pub struct Sensitivity {
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn sensitivities(problem: &Problem, beta: &[f64]) -> Result<Vec<TestSensitivities>, IdentifyError> {
+pub fn sensitivities(problem: &Problem, beta: &[f64]) -> Result<Vec<TestSensitivities>, Diagnostic> {
     let values = problem.slot_values(beta);
     let list = &problem.parameters.list;
     let mut of_tests = Vec::new();
@@ -94,7 +94,7 @@ pub fn sensitivities(problem: &Problem, beta: &[f64]) -> Result<Vec<TestSensitiv
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn over_poses(problem: &Problem, beta: &[f64]) -> Result<Vec<Sensitivity>, IdentifyError> {
+pub fn over_poses(problem: &Problem, beta: &[f64]) -> Result<Vec<Sensitivity>, Diagnostic> {
     let values = problem.slot_values(beta);
     let list = &problem.parameters.list;
     let mut squares = vec![0.0; list.len()];

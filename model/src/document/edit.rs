@@ -7,8 +7,8 @@ use toml_edit::{DocumentMut, InlineTable, Item, Table, TableLike, Value};
 use super::of_domain;
 use super::print::{Block, document_of, number_of, table_of, value_of};
 use crate::chain::Machine;
+use crate::diagnostic::{Diagnostic, Location};
 use crate::effect::Effect;
-use crate::error::{Location, ModelError};
 
 /// The text of a session during edits.
 ///
@@ -31,7 +31,7 @@ use crate::error::{Location, ModelError};
 ///     text.to_string(),
 ///     "# a session\n# end\n\n[[effect]]\ncomponent = \"EZC\"\ndriver = \"C\"\nshape = \"harmonic\"\norder = 2\n"
 /// );
-/// # Ok::<(), abbe_model::ModelError>(())
+/// # Ok::<(), abbe_model::Diagnostic>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct SessionText {
@@ -55,11 +55,9 @@ impl SessionText {
     ///
     /// # Errors
     /// If it is not TOML.
-    pub fn new(text: &str, file: &Path) -> Result<SessionText, ModelError> {
-        let document = text.parse().map_err(|fault: toml_edit::TomlError| ModelError::Input {
-            location: Location::file(file),
-            message: format!("not valid TOML: {}", fault.message()),
-            help: None,
+    pub fn new(text: &str, file: &Path) -> Result<SessionText, Diagnostic> {
+        let document = text.parse().map_err(|fault: toml_edit::TomlError| {
+            Diagnostic::input(Location::file(file), format!("not valid TOML: {}", fault.message()), None)
         })?;
         Ok(SessionText { file: file.to_path_buf(), remark: None, document })
     }
@@ -68,7 +66,7 @@ impl SessionText {
     ///
     /// # Errors
     /// If a value has no form in TOML.
-    pub fn of_document(document: &impl serde::Serialize, file: &Path) -> Result<SessionText, ModelError> {
+    pub fn of_document(document: &impl serde::Serialize, file: &Path) -> Result<SessionText, Diagnostic> {
         Ok(SessionText { file: file.to_path_buf(), remark: None, document: document_of(document)? })
     }
 
@@ -76,7 +74,7 @@ impl SessionText {
     ///
     /// # Errors
     /// If it is not TOML.
-    pub fn set_machine(&mut self, text: &str) -> Result<(), ModelError> {
+    pub fn set_machine(&mut self, text: &str) -> Result<(), Diagnostic> {
         let SessionText { document, .. } = SessionText::new(text, &self.file)?;
         let mut tables = document.into_table();
         // They follow the table that contains them.
@@ -129,7 +127,7 @@ impl SessionText {
     ///
     /// # Errors
     /// If the value has no form in TOML.
-    pub fn set_of_test(&mut self, name: &str, key: &str, value: &impl serde::Serialize) -> Result<(), ModelError> {
+    pub fn set_of_test(&mut self, name: &str, key: &str, value: &impl serde::Serialize) -> Result<(), Diagnostic> {
         let value = value_of(value)?;
         for mut test in tables(&mut self.document, "test") {
             if test.table().get("name").and_then(Item::as_str) == Some(name) {
@@ -189,7 +187,7 @@ impl SessionText {
     ///
     /// # Errors
     /// If the value has no form in TOML.
-    pub fn set_table(&mut self, name: &str, value: &impl serde::Serialize) -> Result<(), ModelError> {
+    pub fn set_table(&mut self, name: &str, value: &impl serde::Serialize) -> Result<(), Diagnostic> {
         self.document.insert(name, Item::Table(table_of(value)?));
         Ok(())
     }
@@ -221,14 +219,14 @@ impl SessionText {
     ///
     /// # Errors
     /// If one of the two folders does not exist.
-    pub fn relocate(&mut self, folder: &Path, data_directory: Option<&Path>) -> Result<(), ModelError> {
+    pub fn relocate(&mut self, folder: &Path, data_directory: Option<&Path>) -> Result<(), Diagnostic> {
         let own = parent(&self.file).to_path_buf();
         let adapt = |value: &mut Value| {
             let named = PathBuf::from(value.as_str().unwrap_or_default());
             if named.is_relative() {
                 replace(value, relative_path(folder, &own.join(named))?);
             }
-            Ok::<(), ModelError>(())
+            Ok::<(), Diagnostic>(())
         };
         if let Some(file) = value_in(&mut self.document, &["machine", "file"]) {
             adapt(file)?;
@@ -252,7 +250,7 @@ impl SessionText {
     ///
     /// # Errors
     /// If the session states its effects as something else than a list of tables.
-    pub fn add_effects(&mut self, effects: &[Effect], machine: &Machine) -> Result<(), ModelError> {
+    pub fn add_effects(&mut self, effects: &[Effect], machine: &Machine) -> Result<(), Diagnostic> {
         effects.iter().try_for_each(|effect| self.add("effect", &of_domain::effect(effect, machine)))
     }
 
@@ -260,7 +258,7 @@ impl SessionText {
     ///
     /// # Errors
     /// As [`SessionText::add_effects`].
-    pub fn add(&mut self, list: &str, entry: &impl serde::Serialize) -> Result<(), ModelError> {
+    pub fn add(&mut self, list: &str, entry: &impl serde::Serialize) -> Result<(), Diagnostic> {
         self.push(list, table_of(entry)?)
     }
 
@@ -268,7 +266,7 @@ impl SessionText {
     ///
     /// # Errors
     /// As [`SessionText::add_effects`].
-    pub fn add_block(&mut self, block: &Block<impl serde::Serialize>) -> Result<(), ModelError> {
+    pub fn add_block(&mut self, block: &Block<impl serde::Serialize>) -> Result<(), Diagnostic> {
         block.table()?.map_or(Ok(()), |table| self.push(block.list, table))
     }
 
@@ -291,7 +289,7 @@ impl SessionText {
         });
     }
 
-    fn push(&mut self, list: &str, mut table: Table) -> Result<(), ModelError> {
+    fn push(&mut self, list: &str, mut table: Table) -> Result<(), Diagnostic> {
         // What follows the last table, such as a comment, stays before the new one.
         let mut prefix = self.document.trailing().as_str().unwrap_or_default().to_string();
         self.document.set_trailing("");
@@ -306,11 +304,11 @@ impl SessionText {
             Item::ArrayOfTables(tables) => tables.push(table),
             Item::Value(Value::Array(items)) => items.push(table.into_inline_table()),
             _ => {
-                return Err(ModelError::Input {
-                    location: Location::file(&self.file),
-                    message: format!("`{list}` is not a list of tables"),
-                    help: Some(format!("write each entry as its own [[{list}]]")),
-                });
+                return Err(Diagnostic::input(
+                    Location::file(&self.file),
+                    format!("`{list}` is not a list of tables"),
+                    format!("write each entry as its own [[{list}]]"),
+                ));
             }
         }
         Ok(())
@@ -404,9 +402,10 @@ fn parent(file: &Path) -> &Path {
 }
 
 /// The name of a file relative to a folder; the absolute name if they share only the root.
-fn relative_path(folder: &Path, file: &Path) -> Result<String, ModelError> {
+fn relative_path(folder: &Path, file: &Path) -> Result<String, Diagnostic> {
     let whole = |path: &Path| {
-        path.canonicalize().map_err(|cause| ModelError::Output { file: path.to_path_buf(), cause: cause.to_string() })
+        path.canonicalize()
+            .map_err(|cause| Diagnostic::session(format!("cannot be written: {cause}"), None).at(Location::file(path)))
     };
     let (from, to) = (whole(folder)?, whole(parent(file))?);
     let shared = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();

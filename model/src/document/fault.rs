@@ -4,7 +4,8 @@ use std::fmt;
 
 use serde::de;
 
-use crate::error::ModelError;
+use crate::Diagnostic;
+use crate::diagnostic::Help;
 
 /// A step from a table or a list to what it contains.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,28 +64,7 @@ pub enum Finding {
         help: String,
     },
     /// An error that has its place already.
-    Other(Box<ModelError>),
-}
-
-/// What to do about a fault, if there is anything to say.
-pub struct Help(Option<String>);
-
-impl From<&str> for Help {
-    fn from(help: &str) -> Help {
-        Help(Some(help.to_string()))
-    }
-}
-
-impl From<String> for Help {
-    fn from(help: String) -> Help {
-        Help(Some(help))
-    }
-}
-
-impl From<Option<String>> for Help {
-    fn from(help: Option<String>) -> Help {
-        Help(help)
-    }
+    Other(Box<Diagnostic>),
 }
 
 /// A fault of a document. The reader of its file finds its place there.
@@ -185,8 +165,8 @@ impl Fault {
     }
 }
 
-impl From<ModelError> for Fault {
-    fn from(error: ModelError) -> Fault {
+impl From<Diagnostic> for Fault {
+    fn from(error: Diagnostic) -> Fault {
         Fault::of(Finding::Other(Box::new(error)))
     }
 }

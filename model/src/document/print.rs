@@ -10,18 +10,18 @@ use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
 
 use super::de::REST;
 use super::node::{self, Node};
-use crate::error::ModelError;
+use crate::Diagnostic;
 
 /// The text of a file that holds a document.
 ///
 /// # Errors
-/// [`ModelError::Session`] if a value has no form in TOML.
-pub fn text_of(document: &impl Serialize) -> Result<String, ModelError> {
+/// If a value has no form in TOML.
+pub fn text_of(document: &impl Serialize) -> Result<String, Diagnostic> {
     document_of(document).map(|document| document.to_string())
 }
 
 /// The document of a file.
-pub(super) fn document_of(document: &impl Serialize) -> Result<DocumentMut, ModelError> {
+pub(super) fn document_of(document: &impl Serialize) -> Result<DocumentMut, Diagnostic> {
     match value_of(document)? {
         Value::InlineTable(inline) => Ok(DocumentMut::from(with_headers(inline, ""))),
         _ => Ok(DocumentMut::new()),
@@ -40,7 +40,7 @@ pub struct Block<T> {
 
 impl<T: Serialize> Block<T> {
     /// The table of the entry.
-    pub(super) fn table(&self) -> Result<Option<Table>, ModelError> {
+    pub(super) fn table(&self) -> Result<Option<Table>, Diagnostic> {
         let Some((entry, remark)) = &self.entry else { return Ok(None) };
         let mut table = table_of(entry)?;
         table.decor_mut().set_prefix(remark.lines().map(|line| format!("# {line}\n")).collect::<String>());
@@ -76,7 +76,7 @@ impl<T> JsonSchema for Block<T> {
 ///
 /// # Errors
 /// As [`text_of`].
-pub fn json_of(document: &impl Serialize) -> Result<serde_json::Value, ModelError> {
+pub fn json_of(document: &impl Serialize) -> Result<serde_json::Value, Diagnostic> {
     Ok(json(value_of(document)?))
 }
 
@@ -114,7 +114,7 @@ fn json(value: Value) -> serde_json::Value {
 
 /// An entry of a list of tables as a table: its tables stand in a line, lists of tables such as `[[effect.alias]]` have
 /// headers.
-pub(super) fn table_of(entry: &impl Serialize) -> Result<Table, ModelError> {
+pub(super) fn table_of(entry: &impl Serialize) -> Result<Table, Diagnostic> {
     match value_of(entry)? {
         Value::InlineTable(inline) => Ok(with_headers(inline, "[]")),
         _ => Ok(Table::new()),
@@ -122,10 +122,12 @@ pub(super) fn table_of(entry: &impl Serialize) -> Result<Table, ModelError> {
 }
 
 /// A value whose tables stand in lines.
-pub(super) fn value_of(document: &impl Serialize) -> Result<Value, ModelError> {
-    let value = document.serialize(ValueSerializer::new()).map_err(|cause| ModelError::Session {
-        message: format!("it cannot be written as TOML: {cause}"),
-        help: "every value is a text, a number, a list or a table".into(),
+pub(super) fn value_of(document: &impl Serialize) -> Result<Value, Diagnostic> {
+    let value = document.serialize(ValueSerializer::new()).map_err(|cause| {
+        Diagnostic::session(
+            format!("it cannot be written as TOML: {cause}"),
+            "every value is a text, a number, a list or a table",
+        )
     })?;
     Ok(tidy(value))
 }

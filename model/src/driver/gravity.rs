@@ -5,10 +5,11 @@
 //! point of the artefact), not at the centre of mass of table and workpiece.
 
 use super::Driver;
-use super::kind::{DriverFault, DriverInput, DriverKind, Entry, Recorded, SymbolInput, Symbols};
+use super::kind::{DriverInput, DriverKind, Entry, Recorded, SymbolInput, Symbols};
 use super::quantity::DriverQuantity;
 use super::sample::{DriverPart, DriverSample};
 use super::unit::DriverUnit;
+use crate::Diagnostic;
 use crate::axis::AxisKind;
 use crate::scalar::Nominal;
 use crate::unit::Unit;
@@ -65,14 +66,11 @@ impl DriverKind for Gravity<'_> {
     fn is_of_component(&self) -> bool {
         true
     }
-    fn check_component(&self, component: &str, axis: Option<AxisKind>) -> Result<(), DriverFault> {
+    fn check_component(&self, component: &str, axis: Option<AxisKind>) -> Result<(), Diagnostic> {
         if axis == Some(AxisKind::Rotary) {
             return Ok(());
         }
-        Err(DriverFault {
-            message: format!("gravity exerts no moment about \"{component}\""),
-            help: "gravity acts on the errors of rotary axes, by a moment about the axis",
-        })
+        Err(Diagnostic::session(format!("gravity exerts no moment about \"{component}\""), "gravity acts on the errors of rotary axes, by a moment about the axis"))
     }
 }
 

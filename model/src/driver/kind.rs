@@ -4,6 +4,7 @@ use super::quantity::DriverQuantity;
 use super::sample::{DriverPart, DriverSample};
 use super::unit::DriverUnit;
 use super::{Driver, Reference};
+use crate::Diagnostic;
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, Machine};
 #[cfg(doc)]
@@ -66,15 +67,6 @@ pub struct Recorded<'a> {
     pub swept: bool,
 }
 
-/// Why an effect cannot have a driver: what is wrong, and advice.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct DriverFault {
-    /// What is wrong, with the component's name in it.
-    pub message: String,
-    /// What to do.
-    pub help: &'static str,
-}
-
 /// Everything that is particular to one driver, except its symbols: see [`Symbols`].
 ///
 /// `axis` is the kind of the axis that the driver is about: the one that it names, or else that of the effect's
@@ -121,7 +113,7 @@ pub trait DriverKind {
     ///
     /// # Errors
     /// If it cannot.
-    fn check_component(&self, component: &str, axis: Option<AxisKind>) -> Result<(), DriverFault> {
+    fn check_component(&self, component: &str, axis: Option<AxisKind>) -> Result<(), Diagnostic> {
         let _ = (component, axis);
         Ok(())
     }

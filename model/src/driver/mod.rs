@@ -8,7 +8,7 @@ mod reference;
 mod sample;
 mod unit;
 
-pub use kind::{DriverFault, DriverInput, DriverKind, Entry, Recorded, SymbolInput, Symbols};
+pub use kind::{DriverInput, DriverKind, Entry, Recorded, SymbolInput, Symbols};
 pub use quantity::DriverQuantity;
 pub use reference::Reference;
 pub use sample::{DriverPart, DriverSample};

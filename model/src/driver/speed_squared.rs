@@ -2,10 +2,11 @@
 //! follows it.
 
 use super::Driver;
-use super::kind::{DriverFault, DriverInput, DriverKind, Entry, Recorded, SymbolInput, Symbols};
+use super::kind::{DriverInput, DriverKind, Entry, Recorded, SymbolInput, Symbols};
 use super::quantity::DriverQuantity;
 use super::sample::DriverSample;
 use super::unit::DriverUnit;
+use crate::Diagnostic;
 use crate::axis::AxisKind;
 use crate::scalar::Nominal;
 use crate::session::readings::Readings;
@@ -54,14 +55,11 @@ impl DriverKind for SpeedSquared {
     fn changes_with_feed(&self) -> bool {
         true
     }
-    fn check_component(&self, component: &str, axis: Option<AxisKind>) -> Result<(), DriverFault> {
+    fn check_component(&self, component: &str, axis: Option<AxisKind>) -> Result<(), Diagnostic> {
         if axis.is_some() {
             return Ok(());
         }
-        Err(DriverFault {
-            message: format!("\"{component}\" belongs to no axis, so it has no speed"),
-            help: "the driver is the speed of the component's own axis; name an error of an axis",
-        })
+        Err(Diagnostic::session(format!("\"{component}\" belongs to no axis, so it has no speed"), "the driver is the speed of the component's own axis; name an error of an axis"))
     }
 }
 

@@ -2,7 +2,8 @@
 
 use serde::Deserialize;
 
-use crate::document::fault::{Fault, Help, Within};
+use crate::diagnostic::Help;
+use crate::document::fault::{Fault, Within};
 use crate::document::from_node;
 use crate::document::node::{Entries, Node};
 use crate::driver::{DriverUnit, unit_suffixes};

@@ -17,7 +17,7 @@ pub mod shape;
 pub use component::Component;
 pub use part::EffectPart;
 pub use prior::CoefficientPrior;
-pub use shape::{Shape, ShapeFault};
+pub use shape::Shape;
 
 use crate::axis::AxisKind;
 use crate::chain::Machine;

@@ -103,7 +103,7 @@ fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
 /// // A bar that is 2 µm longer than stated reads 2 µm less.
 /// let longer = |unknown| (unknown == BAR).then_some(0.002);
 /// assert_eq!(station.read(&machine, &state, &none, longer).channels(), [99.998]);
-/// # Ok::<(), abbe_model::ModelError>(())
+/// # Ok::<(), abbe_model::Diagnostic>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct BallBar<N> {

@@ -21,9 +21,9 @@ use std::str::FromStr;
 
 use column::Quantity;
 
+use crate::Diagnostic;
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::component::ErrorName;
-use crate::error::ModelError;
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
 use crate::words::listed;
@@ -160,12 +160,14 @@ pub fn kinds() -> &'static [InstrumentKind] {
 
 /// The kind of a word in files.
 impl FromStr for InstrumentKind {
-    type Err = ModelError;
+    type Err = Diagnostic;
 
-    fn from_str(word: &str) -> Result<InstrumentKind, ModelError> {
-        kinds().iter().copied().find(|kind| kind.word() == word).ok_or_else(|| ModelError::Session {
-            message: format!("no instrument is called `{word}`"),
-            help: listed(&kinds().iter().map(|kind| kind.word()).collect::<Vec<_>>(), "or"),
+    fn from_str(word: &str) -> Result<InstrumentKind, Diagnostic> {
+        kinds().iter().copied().find(|kind| kind.word() == word).ok_or_else(|| {
+            Diagnostic::session(
+                format!("no instrument is called `{word}`"),
+                listed(&kinds().iter().map(|kind| kind.word()).collect::<Vec<_>>(), "or"),
+            )
         })
     }
 }

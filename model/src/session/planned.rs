@@ -3,8 +3,8 @@
 use super::motion::Motion;
 use super::readings::Readings;
 use super::{Session, Test, trajectory};
+use crate::Diagnostic;
 use crate::chain::Machine;
-use crate::error::ModelError;
 use crate::instrument::{Checked, Station};
 use crate::words::number;
 
@@ -17,18 +17,18 @@ const BETWEEN_TESTS_S: f64 = 120.0;
 ///
 /// # Errors
 /// If an axis would exceed its travel, if the balls cannot be placed on the path, or if there is no plan.
-pub fn planned(machine: &Machine, test: &Test) -> Result<Readings, ModelError> {
-    checked_plan(machine, test).map_err(|(message, help)| ModelError::Plan { message, help })
+pub fn planned(machine: &Machine, test: &Test) -> Result<Readings, Diagnostic> {
+    checked_plan(machine, test).map_err(|(message, help)| Diagnostic::session(message, help))
 }
 
 /// Checks that the instrument reaches at every position of a planned motion, as a program needs it.
 ///
 /// # Errors
 /// As [`planned`], and if it does not reach; the message names the position.
-pub fn reaches(machine: &Machine, test: &Test) -> Result<(), ModelError> {
+pub fn reaches(machine: &Machine, test: &Test) -> Result<(), Diagnostic> {
     let readings = planned(machine, test)?;
     let found = test.station.check_planned(&Checked { machine, test: &test.name, readings: &readings });
-    found.map_err(|(message, help)| ModelError::Plan { message, help })
+    found.map_err(|(message, help)| Diagnostic::session(message, help))
 }
 
 /// The planned states of a test that its instrument reads as it is set up; `None` if an axis would leave its travel, or a
@@ -44,7 +44,7 @@ pub fn feasible(machine: &Machine, test: &Test) -> Option<Readings> {
 ///
 /// # Errors
 /// As [`planned`].
-pub fn planned_session(session: &Session) -> Result<Vec<Readings>, ModelError> {
+pub fn planned_session(session: &Session) -> Result<Vec<Readings>, Diagnostic> {
     let mut start_s = 0.0;
     session
         .tests

@@ -17,6 +17,7 @@ mod shape;
 
 use std::collections::BTreeMap;
 
+use abbe_model::Diagnostic;
 use abbe_model::session::motion::Motion;
 use abbe_model::session::moves::Moves;
 use abbe_model::session::{Session, Test};
@@ -24,7 +25,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::states;
-use crate::PlanError;
 pub use parts::{Bodies, Parts};
 pub(crate) use shape::segment_distance;
 
@@ -67,7 +67,7 @@ pub fn unchecked(session: &Session, measured: bool) -> Option<String> {
 ///
 /// # Errors
 /// If the states of a test cannot be planned.
-pub fn warnings_of_programs(session: &Session, moves: &[Moves]) -> Result<Vec<String>, PlanError> {
+pub fn warnings_of_programs(session: &Session, moves: &[Moves]) -> Result<Vec<String>, Diagnostic> {
     let complete = states::complete(session, true)?;
     let mut found: Vec<String> = unchecked(session, true).into_iter().collect();
     found.extend(warnings(&complete, &clearances(&complete)));

@@ -6,15 +6,14 @@
 
 use std::collections::HashMap;
 
-use abbe_identify::IdentifyError;
+use abbe_identify::error;
 use abbe_identify::linear::Linearisation;
 use abbe_identify::numerics::reduction::inverse_of_upper;
 use abbe_identify::numerics::triangle::upper;
 use abbe_identify::problem::Problem;
+use abbe_model::Diagnostic;
 use abbe_model::session::Prior;
 use faer::{Mat, MatRef};
-
-use crate::PlanError;
 
 /// The parameters that tests share, in column order. The target parameters are last.
 #[derive(Clone, Debug)]
@@ -60,12 +59,12 @@ impl SharedParameters {
     ///
     /// # Errors
     /// If a parameter does not belong to the problem.
-    pub fn root_of(&self, problem: &Problem, linear: &Linearisation) -> Result<Root, PlanError> {
+    pub fn root_of(&self, problem: &Problem, linear: &Linearisation) -> Result<Root, Diagnostic> {
         let list = &problem.parameters.list;
         let index: HashMap<&str, usize> =
             list.iter().enumerate().map(|(j, parameter)| (parameter.id.as_str(), j)).collect();
         let known = || list.iter().map(|parameter| &parameter.id);
-        let unknown = |id: &String| IdentifyError::unknown("the plan", "parameter", id, "its parameters are", known());
+        let unknown = |id: &String| error::unknown("the plan", "parameter", id, "its parameters are", known());
         let columns = self.ids.iter().map(|id| index.get(id.as_str()).copied().ok_or_else(|| unknown(id)));
         let columns = columns.collect::<Result<Vec<usize>, _>>()?;
         Ok(self.regularised(linear.marginal(&columns)?.as_ref(), 1.0))

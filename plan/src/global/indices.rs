@@ -16,8 +16,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::sequence;
-use crate::PlanError;
 use abbe_identify::numerics::parallel;
+use abbe_model::Diagnostic;
 
 /// Number of resamplings of the confidence intervals.
 const RESAMPLES: usize = 200;
@@ -55,8 +55,8 @@ impl Design {
         inputs: usize,
         samples: usize,
         seed: u64,
-        of: &(dyn Fn(&[f64]) -> Result<Vec<f64>, PlanError> + Sync),
-    ) -> Result<Design, PlanError> {
+        of: &(dyn Fn(&[f64]) -> Result<Vec<f64>, Diagnostic> + Sync),
+    ) -> Result<Design, Diagnostic> {
         let mut random = Pcg64::new(u128::from(seed), 0);
         let shift: Vec<u32> = (0..2 * inputs).map(|_| random.random()).collect();
         let points = sequence::points(2 * inputs, samples, &shift)?;

@@ -21,12 +21,13 @@
 mod indices;
 mod sequence;
 
-use abbe_identify::IdentifyError;
+use abbe_identify::error;
 use abbe_identify::linear::{Linearisation, is_of_interest, prior_u};
 use abbe_identify::noise::ReadingNoise;
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_identify::quantity::Given;
+use abbe_model::Diagnostic;
 use abbe_model::session::Prior;
 use abbe_trace::candidates::columns::Columns;
 use abbe_trace::candidates::library;
@@ -38,7 +39,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use crate::PlanError;
+use crate::error::too_many;
+
 pub use indices::SobolIndex;
 
 /// Maximum number of steps of the chord method.
@@ -156,20 +158,20 @@ struct Plan<'p> {
 /// # Errors
 /// If a name of `vary` is neither a set-up parameter with a prior nor an effect of the library, if there are too many
 /// inputs, or if a fit does not converge because an input is too large.
-pub fn global(problem: &Problem, options: &GlobalOptions) -> Result<GlobalAnalysis, PlanError> {
+pub fn global(problem: &Problem, options: &GlobalOptions) -> Result<GlobalAnalysis, Diagnostic> {
     if options.samples < 8 {
         let (purpose, found) = ("the global analysis", options.samples);
-        return Err(IdentifyError::TooFew { purpose, what: "samples", least: 8, found }.into());
+        return Err(error::too_few(purpose, "samples", 8, found));
     }
     let plan = Plan::new(problem, options)?;
     let (fits, estimates) = (options.samples * (plan.inputs.len() + 2), plan.errors.len());
     if fits.saturating_mul(estimates) > MAX_ESTIMATES {
         let (samples, inputs) = (options.samples, plan.inputs.len());
-        return Err(PlanError::TooMany {
-            found: format!("{samples} samples of {inputs} inputs are {fits} fits, each of {estimates} errors"),
-            limit: MAX_ESTIMATES,
-            remedy: "state fewer samples".to_string(),
-        });
+        return Err(too_many(
+            format!("{samples} samples of {inputs} inputs are {fits} fits, each of {estimates} errors"),
+            MAX_ESTIMATES,
+            "state fewer samples",
+        ));
     }
     let design = Design::evaluate(plan.inputs.len(), options.samples, options.seed, &|point| plan.estimate(point))?;
     let shares = plan.linear_variances()?;
@@ -210,7 +212,7 @@ pub fn global(problem: &Problem, options: &GlobalOptions) -> Result<GlobalAnalys
 }
 
 impl<'p> Plan<'p> {
-    fn new(problem: &'p Problem, options: &GlobalOptions) -> Result<Plan<'p>, PlanError> {
+    fn new(problem: &'p Problem, options: &GlobalOptions) -> Result<Plan<'p>, Diagnostic> {
         let list = &problem.parameters.list;
         let nominal = vec![0.0; list.len()];
         let mut truth = problem.clone();
@@ -234,7 +236,7 @@ impl<'p> Plan<'p> {
                 let uncertain = list.iter().filter(|p| p.role == Role::Setup && prior_u(p).is_some());
                 let what = "set-up parameter with an uncertainty and no effect of the library called";
                 let these = "identifiers are as in `bar[A100]` and `EZC~C:h2`; the set-up parameters are:";
-                return Err(IdentifyError::unknown("the plan", what, &given.id, these, uncertain.map(|p| &p.id)).into());
+                return Err(error::unknown("the plan", what, &given.id, these, uncertain.map(|p| &p.id)));
             };
             let first = truth.parameters.list.len();
             truth.add_effect(&candidate.effect)?;
@@ -267,7 +269,7 @@ impl<'p> Plan<'p> {
     }
 
     /// The estimates of the errors, internal units, for inputs between 0 and 1.
-    fn estimate(&self, point: &[f64]) -> Result<Vec<f64>, PlanError> {
+    fn estimate(&self, point: &[f64]) -> Result<Vec<f64>, Diagnostic> {
         let mut truth = vec![0.0; self.truth.parameters.list.len()];
         let mut noise = vec![0.0; self.columns.rows()];
         for (input, u) in self.inputs.iter().zip(point) {
@@ -314,11 +316,11 @@ impl<'p> Plan<'p> {
             }
         }
         let found = "a fit does not converge";
-        Err(IdentifyError::not_applicable("global analysis", found, "an input is too large: reduce its size").into())
+        Err(error::not_applicable("global analysis", found, "an input is too large: reduce its size"))
     }
 
     /// Variance of each error by each input in linear propagation, internal units.
-    fn linear_variances(&self) -> Result<Vec<Vec<f64>>, PlanError> {
+    fn linear_variances(&self) -> Result<Vec<Vec<f64>>, Diagnostic> {
         let nominal = vec![0.0; self.truth.parameters.list.len()];
         let truth = Columns::new(&self.truth, &nominal);
         let rows = truth.model_rows(&nominal)?;

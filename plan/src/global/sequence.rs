@@ -3,7 +3,9 @@
 //! Direction numbers of Joe & Kuo, SIAM J. Sci. Comput. 30 (2008) 2635, in the order of the Gray code. A random digital
 //! shift keeps the evenness and moves all points off the faces of the cube.
 
-use crate::PlanError;
+use abbe_model::Diagnostic;
+
+use crate::error::too_many;
 
 /// Maximum number of dimensions.
 pub const MAX_DIMENSIONS: usize = 128;
@@ -15,13 +17,13 @@ const NUMBERS: &str = include_str!("direction-numbers.txt");
 ///
 /// # Errors
 /// If there are more than [`MAX_DIMENSIONS`].
-pub fn points(dimensions: usize, count: usize, shift: &[u32]) -> Result<Vec<Vec<f64>>, PlanError> {
+pub fn points(dimensions: usize, count: usize, shift: &[u32]) -> Result<Vec<Vec<f64>>, Diagnostic> {
     if dimensions > MAX_DIMENSIONS {
-        return Err(PlanError::TooMany {
-            found: format!("{} varied inputs need {dimensions} dimensions of the Sobol' sequence", dimensions / 2),
-            limit: MAX_DIMENSIONS,
-            remedy: "state fewer priors, or analyse fewer tests".to_string(),
-        });
+        return Err(too_many(
+            format!("{} varied inputs need {dimensions} dimensions of the Sobol' sequence", dimensions / 2),
+            MAX_DIMENSIONS,
+            "state fewer priors, or analyse fewer tests",
+        ));
     }
     let lines: Vec<&str> = NUMBERS.lines().filter(|line| !line.starts_with('#')).collect();
     let directions: Vec<[u32; BITS]> =

@@ -3,6 +3,7 @@
 
 use std::f64::consts::TAU;
 
+use abbe_model::Diagnostic;
 use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::chain::{BodyErrors, Machine};
 use abbe_model::frames::Point;
@@ -14,7 +15,6 @@ use rand_pcg::Pcg64;
 
 use super::between;
 use super::place::Place;
-use crate::PlanError;
 use crate::collision::{Bodies, Parts, segment_distance};
 use abbe_identify::numerics::parallel;
 
@@ -73,13 +73,16 @@ pub(super) fn draw(
     limits: &PoseLimits,
     count: usize,
     random: &mut Pcg64,
-) -> Result<Candidates, PlanError> {
+) -> Result<Candidates, Diagnostic> {
     let machine = &*session.machine;
     let station = &test.station;
     let is_placed = station.table_point_mm().is_some();
     let untravelled = machine.axes.iter().find(|axis| axis.kind == AxisKind::Linear && axis.travel.is_none());
     if let (Some(axis), false) = (untravelled, is_placed) {
-        return Err(PlanError::NoTravel { axis: axis.name.clone() });
+        return Err(Diagnostic::identification(format!(
+            "axis `{}` states no travel, so that no poses can be drawn; add `travel_mm` to the machine",
+            axis.name
+        )));
     }
     let iterates = match station.contact() {
         Contact::None => false,

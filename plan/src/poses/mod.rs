@@ -11,9 +11,10 @@ pub mod candidates;
 mod place;
 mod rank;
 
-use abbe_identify::IdentifyError;
 use std::sync::Arc;
 
+use abbe_identify::error;
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
@@ -26,7 +27,6 @@ use rand_pcg::Pcg64;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::PlanError;
 use crate::design::information::SharedParameters;
 use crate::design::{Design, Goal, bound};
 use crate::improve::NamedUncertainty;
@@ -133,9 +133,12 @@ pub fn without_place<'t>(session: &Session, tests: &[&'t Test]) -> Vec<&'t Test>
 /// # Errors
 /// If a socket has no place, no pose reaches where the instrument measures, the limits leave too few candidates, or the
 /// model cannot be evaluated.
-pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Result<PoseSelection, PlanError> {
+pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Result<PoseSelection, Diagnostic> {
     if let Some(test) = without_place(session, tests).first() {
-        return Err(PlanError::NoPlace { test: test.name.clone() });
+        return Err(Diagnostic::identification(format!(
+            "test `{}`: the place of its socket is not known; state `socket_mm`, or give the data with poses in the socket",
+            test.name
+        )));
     }
     let asked = counted(options.poses, "chosen pose");
     let Found { tests, candidates, excluded, warnings } = candidates(session, tests, options)?;
@@ -143,7 +146,7 @@ pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Resu
         let (left, drawn) = (candidates.len(), candidates.len() + excluded);
         let found = format!("{left} of {drawn} drawn poses are within the limits");
         let expected = "widen the limits or draw more candidates";
-        return Err(IdentifyError::not_applicable(asked, found, expected).into());
+        return Err(error::not_applicable(asked, found, expected));
     }
     let problem = problem(session, &tests, &candidates, noise(session, options))?;
     let list = &problem.parameters.list;
@@ -173,7 +176,7 @@ pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Resu
         let found =
             format!("the readings of {} have rank {rank_of_chosen} in {unknowns}", counted(options.poses, "pose"));
         let least = options.poses + lacking.div_ceil(problem.channels(0));
-        return Err(IdentifyError::not_applicable(asked, found, format!("ask for at least {least} poses")).into());
+        return Err(error::not_applicable(asked, found, format!("ask for at least {least} poses")));
     };
     let views = rows.iter().map(|rows| rows.as_ref()).collect();
     let design = Design { shared: &shared, base: &base, rows: views, goal: &options.goal, repeats: false };
@@ -186,7 +189,7 @@ pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Resu
             let [rank, involved] = ranked.rank(&poses)?;
             Ok(if rank == involved { value(&poses) } else { f64::INFINITY })
         })
-        .collect::<Result<Vec<f64>, PlanError>>()?;
+        .collect::<Result<Vec<f64>, Diagnostic>>()?;
     let u = shared.uncertainties(&design.with(&chosen));
     let machine = &session.machine;
     let display = |pose: &usize| -> Vec<f64> {
@@ -242,12 +245,12 @@ struct Chosen {
 }
 
 /// Chooses poses with the pivots of a rank held at nominal.
-fn chosen_with(problem: &Problem, rank: Rank, prior: &Mat<f64>, options: &PoseOptions) -> Result<Chosen, PlanError> {
+fn chosen_with(problem: &Problem, rank: Rank, prior: &Mat<f64>, options: &PoseOptions) -> Result<Chosen, Diagnostic> {
     let list = &problem.parameters.list;
     let kept: Vec<usize> = (0..list.len()).filter(|j| !rank.pivots.contains(j)).collect();
     let (others, of_targets): (Vec<usize>, Vec<usize>) = kept.into_iter().partition(|j| list[*j].role == Role::Setup);
     if of_targets.is_empty() {
-        return Err(IdentifyError::NoUnknowns.into());
+        return Err(error::no_unknowns());
     }
     let shared = SharedParameters::of(problem, &others, &of_targets);
     let columns = [others, of_targets.clone()].concat();
@@ -291,7 +294,7 @@ struct Found {
 }
 
 /// Candidates of all tests, as many of each. A test without any is left out with a warning unless all are.
-fn candidates(session: &Session, tests: &[&Test], options: &PoseOptions) -> Result<Found, PlanError> {
+fn candidates(session: &Session, tests: &[&Test], options: &PoseOptions) -> Result<Found, Diagnostic> {
     let mut random = Pcg64::new(u128::from(options.seed), CANDIDATE_STREAM);
     let mut found = Found { tests: Vec::new(), candidates: Vec::new(), excluded: 0, warnings: untravelled(session) };
     let mut unmet = None;
@@ -302,7 +305,10 @@ fn candidates(session: &Session, tests: &[&Test], options: &PoseOptions) -> Resu
         if drawn.states.is_empty() && drawn.unmet > 0 && drawn.unmet == drawn.excluded {
             let (goal, check) = Place::words(&test.station);
             found.warnings.push(format!("test `{}`: no drawn pose {goal}; it is left out", test.name));
-            unmet.get_or_insert(PlanError::OutOfReach { test: test.name, drawn: drawn.unmet, goal, check });
+            unmet.get_or_insert(Diagnostic::identification(format!(
+                "test `{}`: none of {} drawn poses {goal} within the travel of the axes; check {check}",
+                test.name, drawn.unmet
+            )));
             continue;
         }
         let number = found.tests.len();
@@ -324,7 +330,7 @@ fn untravelled(session: &Session) -> Vec<String> {
 }
 
 /// The problem of a session with these tests, which have a reading at every candidate pose.
-fn problem(session: &Session, tests: &[Test], candidates: &[Candidate], noise: Noise) -> Result<Problem, PlanError> {
+fn problem(session: &Session, tests: &[Test], candidates: &[Candidate], noise: Noise) -> Result<Problem, Diagnostic> {
     let means = session.reference().means;
     let with_readings = |(number, test): (usize, &Test)| {
         let poses: Vec<&[f64]> =
@@ -342,7 +348,7 @@ fn problem(session: &Session, tests: &[Test], candidates: &[Candidate], noise: N
 }
 
 /// The whitened rows of each candidate pose, in the order of the tests.
-fn whitened(problem: &Problem, columns: &[usize]) -> Result<Vec<Mat<f64>>, PlanError> {
+fn whitened(problem: &Problem, columns: &[usize]) -> Result<Vec<Mat<f64>>, Diagnostic> {
     let values = problem.slot_values(&vec![0.0; problem.parameters.list.len()]);
     let sigma = problem.noise.sigma_mm;
     let mut rows = Vec::new();

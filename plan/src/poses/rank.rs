@@ -1,9 +1,9 @@
 //! The rank of the readings of some poses.
 
 use abbe_identify::numerics::solve::Svd;
+use abbe_model::Diagnostic;
 use faer::Mat;
 
-use crate::PlanError;
 use crate::design::information::{SharedParameters, sum_of};
 
 /// The readings of candidate poses and the priors, without regularisation.
@@ -19,7 +19,7 @@ pub(super) struct Readings<'r> {
 impl Readings<'_> {
     /// Numerical rank of the readings of some poses with the priors, and the number of parameters that they involve: the
     /// place of a socket without a pose is none of them.
-    pub fn rank(&self, poses: &[usize]) -> Result<[usize; 2], PlanError> {
+    pub fn rank(&self, poses: &[usize]) -> Result<[usize; 2], Diagnostic> {
         let (count, size) = (self.shared.ids.len(), &self.shared.size);
         let first = count - self.shared.targets;
         let involved =

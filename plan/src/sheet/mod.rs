@@ -4,6 +4,7 @@ mod datum;
 mod mounts;
 
 use abbe_identify::series::paths::{SetUpPath, set_up};
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::instrument::ballbar::BallBar;
@@ -12,7 +13,6 @@ use abbe_model::session::placing::{balls, positions_for_bar};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Prior, Session, Test};
 
-use crate::PlanError;
 use crate::collision::{self, TestClearance};
 use crate::states;
 pub use datum::{Datum, datum};
@@ -113,7 +113,7 @@ impl AxisRange {
 ///
 /// # Errors
 /// If a test has neither a motion nor data, or an axis would leave its travel.
-pub fn sheets(session: &Session, times: SetUpTimes, basic_bar_mm: Option<f64>) -> Result<Vec<TestSheet>, PlanError> {
+pub fn sheets(session: &Session, times: SetUpTimes, basic_bar_mm: Option<f64>) -> Result<Vec<TestSheet>, Diagnostic> {
     let complete = states::complete(session, true)?;
     let clearances = collision::clearances(&complete);
     let mut sheets: Vec<TestSheet> = Vec::with_capacity(complete.tests.len());

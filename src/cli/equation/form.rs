@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use abbe::codegen::print::{LANGUAGES, OutputLanguage, language};
 use abbe::codegen::{Arrangement, Equation, Options, Order, SessionTest, Source, Symbols, check};
 use abbe::equation::EquationParameters;
+use abbe::model::Diagnostic;
 use abbe::model::frames::Rotation;
 use abbe::model::session::{Session, Test};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::style::StyleArguments;
-use crate::cli::failure::Failure;
 use crate::cli::output;
 use crate::cli::values::{self, Words};
 
@@ -96,7 +96,7 @@ impl FormArguments {
         test: &'s Test,
         source: SessionTest<'s>,
         first: bool,
-    ) -> Result<(Equation, SessionTest<'s>), Failure> {
+    ) -> Result<(Equation, SessionTest<'s>), Diagnostic> {
         let parameters = EquationParameters::of_test(session, test, &self.errors)?;
         let whole = self.options(&parameters);
         let options = if first { whole.in_first_order() } else { whole };
@@ -104,12 +104,12 @@ impl FormArguments {
     }
 
     /// Writes a checked equation.
-    pub fn write(&self, equation: &Equation, source: &impl Source) -> Result<(), Failure> {
+    pub fn write(&self, equation: &Equation, source: &impl Source) -> Result<(), Diagnostic> {
         self.put(&self.language.print(&check(equation, source)?, &self.style.style(self.language)?)?)
     }
 
     /// Writes a text to the requested file or to standard output.
-    pub fn put(&self, text: &str) -> Result<(), Failure> {
+    pub fn put(&self, text: &str) -> Result<(), Diagnostic> {
         if let Some(path) = &self.out {
             return output::write_whole(path, text.as_bytes());
         }

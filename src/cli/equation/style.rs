@@ -1,9 +1,9 @@
 //! How an equation is set or called: the options of `abbe equation` that do not change its content.
 
 use abbe::codegen::print::{AngleUnit, Audience, LANGUAGES, Layout, Numbering, OutputLanguage, Style};
+use abbe::model::Diagnostic;
 use clap::Args;
 
-use crate::cli::failure::Failure;
 use crate::cli::values::{self, Words};
 
 const NUMBERINGS: Words<Numbering> = &[("none", Numbering::None), ("last", Numbering::Last), ("all", Numbering::All)];
@@ -56,7 +56,7 @@ fn width_mm(text: &str) -> Result<f64, String> {
 
 impl StyleArguments {
     /// Refuses options that the language ignores.
-    pub fn style(&self, language: &OutputLanguage) -> Result<Style, Failure> {
+    pub fn style(&self, language: &OutputLanguage) -> Result<Style, Diagnostic> {
         let typeset = [
             ("--number", self.number.is_some()),
             ("--width", self.width.is_some()),
@@ -79,12 +79,12 @@ impl StyleArguments {
                     language.word,
                     known.join(", ")
                 );
-                return Err(Failure::Other(message));
+                return Err(Diagnostic::other(message));
             }
         }
         if matches!((self.layout, self.angles), (Some(Layout::Flat), Some(_))) {
             let message = "`--angles` does not apply to `--layout flat`, whose arguments are sines and cosines";
-            return Err(Failure::Other(message.to_string()));
+            return Err(Diagnostic::other(message.to_string()));
         }
         Ok(Style {
             numbering: self.number.unwrap_or(Numbering::None),

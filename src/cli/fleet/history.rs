@@ -8,9 +8,10 @@ use abbe::files;
 use abbe::fleet::compensations;
 use abbe::fleet::history::{history, statements};
 use abbe::fleet::store::Store;
+use abbe::model::Diagnostic;
 use clap::Args;
 
-use crate::cli::failure::Failure;
+use crate::cli::failure::command_line;
 use crate::cli::folder;
 use crate::cli::results::{OutputArguments, Read};
 use crate::printers::page;
@@ -59,13 +60,13 @@ pub struct HistoryArguments {
 const LONGEST_NAME: usize = 60;
 
 /// Runs `abbe fleet history`.
-pub fn run(arguments: &HistoryArguments) -> Result<(), Failure> {
+pub fn run(arguments: &HistoryArguments) -> Result<(), Diagnostic> {
     let outputs = arguments.output.prepared(&[])?;
     if !(arguments.false_discovery_rate > 0.0 && arguments.false_discovery_rate < 1.0) {
-        return Err(Failure::CommandLine("`--false-discovery-rate`: a number between 0 and 1 is expected".into()));
+        return Err(command_line("`--false-discovery-rate`: a number between 0 and 1 is expected"));
     }
     if !(arguments.tolerance_u > 0.0 && arguments.tolerance_u.is_finite()) {
-        return Err(Failure::CommandLine("`--tolerance-u`: a positive number is expected".into()));
+        return Err(command_line("`--tolerance-u`: a positive number is expected"));
     }
     if let Some(path) = &arguments.pages {
         folder::check(path, arguments.output.folder.force)?;
@@ -87,7 +88,7 @@ pub fn run(arguments: &HistoryArguments) -> Result<(), Failure> {
     };
     arguments.output.put(&outputs, &report, &stated, &read)?;
     let Some(path) = &arguments.pages else { return Ok(()) };
-    let html = |report: &Report| page::html(report, &read.provenance()).map_err(Failure::Other);
+    let html = |report: &Report| page::html(report, &read.provenance()).map_err(Diagnostic::other);
     let mut files = vec![("index.html".to_string(), html(&report::fleet(&stated))?)];
     for (number, machine) in found.history.machines.iter().enumerate() {
         let plain = |sign: char| if sign.is_alphanumeric() || "-_.".contains(sign) { sign } else { '_' };

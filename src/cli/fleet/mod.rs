@@ -4,13 +4,14 @@ mod history;
 mod run;
 mod study;
 
-use abbe::fleet::FleetError;
 use abbe::fleet::pool::{self, Pooled, ShouldContinue};
 use abbe::fleet::store::IfClaimed;
+use abbe::identify::error::INTERRUPTED;
+use abbe::model::Diagnostic;
 use clap::{Args, Subcommand};
 
 use super::Global;
-use super::failure::Failure;
+use super::failure::stopped;
 use super::interrupt::Interrupts;
 use super::message::progress_bar;
 
@@ -42,7 +43,7 @@ enum Fleet {
 }
 
 /// Runs a command of `abbe fleet`, with one thread if no number is stated.
-pub fn run(arguments: &FleetArguments, global: Global) -> Result<(), Failure> {
+pub fn run(arguments: &FleetArguments, global: Global) -> Result<(), Diagnostic> {
     let threads = global.threads.unwrap_or(1);
     match &arguments.command {
         Fleet::Run(arguments) => run::run(arguments, threads),
@@ -57,18 +58,18 @@ fn all<U: Sync, T: Send>(
     units: &[U],
     (things, count): (&str, String),
     (threads, quiet): (u32, bool),
-    unit: impl Fn(&U, IfClaimed, ShouldContinue<'_>) -> Result<Option<T>, FleetError> + Sync,
-) -> (Vec<T>, Result<(), Failure>) {
+    unit: impl Fn(&U, IfClaimed, ShouldContinue<'_>) -> Result<Option<T>, Diagnostic> + Sync,
+) -> (Vec<T>, Result<(), Diagnostic>) {
     let (bar, interrupts) = (progress_bar(units.len(), things, quiet), Interrupts::noticed());
     let Pooled { done, ended } = pool::all(units, threads as usize, &|| !interrupts.came(), unit, &|| bar.inc(1));
     bar.finish_and_clear();
     let ended = match ended {
         None => Ok(()),
-        Some(FleetError::Interrupted) => {
+        Some(error) if error.code == INTERRUPTED => {
             let message = format!("interrupted: {} of {count} done; the same command continues", done.len());
-            Err(Failure::Interrupted(message))
+            Err(stopped(message))
         }
-        Some(error) => Err(error.into()),
+        Some(error) => Err(error),
     };
     (done, ended)
 }

@@ -8,11 +8,11 @@ use abbe::fleet::options::Options;
 use abbe::fleet::run::RunResult;
 use abbe::fleet::store::Store;
 use abbe::fleet::unit::{self, Places};
+use abbe::model::Diagnostic;
 use abbe::model::words::counted;
 use clap::Args;
 
 use super::all;
-use crate::cli::failure::Failure;
 use crate::cli::results::{OutputArguments, Read};
 use crate::report;
 
@@ -67,12 +67,12 @@ fn part(text: &str) -> Result<(usize, usize), String> {
 }
 
 /// Runs `abbe fleet run`.
-pub fn run(arguments: &RunArguments, threads: u32) -> Result<(), Failure> {
+pub fn run(arguments: &RunArguments, threads: u32) -> Result<(), Diagnostic> {
     let outputs = arguments.output.prepared(&[])?;
     let (paths, files) = list::chosen(&arguments.sessions, arguments.listed.as_deref(), arguments.part)?;
     if let Some(models) = arguments.models.as_ref().filter(|models| !models.is_dir()) {
         let message = format!("{}: this is no folder; name the folder of the saved models", models.display());
-        return Err(Failure::Other(message));
+        return Err(Diagnostic::other(message));
     }
     let store = Store::open(&arguments.out)?;
     store.remove_stale();

@@ -6,10 +6,10 @@ use abbe::fleet::store::Store;
 use abbe::fleet::study;
 use abbe::fleet::study::file;
 use abbe::fleet::study::summary::summary;
+use abbe::model::Diagnostic;
 use clap::Args;
 
 use super::all;
-use crate::cli::failure::Failure;
 use crate::cli::results::{OutputArguments, Read};
 use crate::report::study as present;
 
@@ -32,7 +32,7 @@ pub struct StudyArguments {
 }
 
 /// Runs `abbe fleet study`.
-pub fn run(arguments: &StudyArguments, threads: u32) -> Result<(), Failure> {
+pub fn run(arguments: &StudyArguments, threads: u32) -> Result<(), Diagnostic> {
     let outputs = arguments.output.prepared(&[])?;
     outputs.refuse_overwrite([arguments.study.as_path()])?;
     let study = file::read(&arguments.study)?;

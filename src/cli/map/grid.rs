@@ -1,19 +1,19 @@
 //! The places of a map.
 
 use abbe::apply::volumetric;
+use abbe::model::Diagnostic;
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::Machine;
 
-use crate::cli::failure::Failure;
 use crate::cli::values;
 
 /// Positions of each axis, mm or rad.
-pub fn grid(machine: &Machine, places: usize, axes: &[String]) -> Result<Vec<Vec<f64>>, Failure> {
+pub fn grid(machine: &Machine, places: usize, axes: &[String]) -> Result<Vec<Vec<f64>>, Diagnostic> {
     values::count("--places", "places", places, volumetric::MAX_POINTS)?;
     let mut wanted: Vec<Option<(char, f64)>> = vec![None; machine.axes.len()];
     for text in axes {
         let fault = || {
-            Failure::Other(format!(
+            Diagnostic::other(format!(
                 "--axis {text}: write where the axis stands, `A=30`, or its number of places, `X:11`"
             ))
         };
@@ -26,11 +26,11 @@ pub fn grid(machine: &Machine, places: usize, axes: &[String]) -> Result<Vec<Vec
         if sign == '=' {
             values::POSITION.check(&format!("--axis {}=", name.trim()), number)?;
         } else if number > volumetric::MAX_POINTS as f64 {
-            return Err(Failure::Other(format!("--axis {text}: {} places are the most", volumetric::MAX_POINTS)));
+            return Err(Diagnostic::other(format!("--axis {text}: {} places are the most", volumetric::MAX_POINTS)));
         }
         let Some(axis) = machine.axis_index(name.trim()) else {
             let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
-            return Err(Failure::Other(format!(
+            return Err(Diagnostic::other(format!(
                 "--axis {text}: the machine has no axis `{}`; its axes are {}",
                 name.trim(),
                 names.join(", ")
@@ -38,7 +38,7 @@ pub fn grid(machine: &Machine, places: usize, axes: &[String]) -> Result<Vec<Vec
         };
         wanted[axis] = Some((sign, number));
     }
-    let along = |axis: usize| -> Result<Vec<f64>, Failure> {
+    let along = |axis: usize| -> Result<Vec<f64>, Diagnostic> {
         let body = &machine.axes[axis];
         let count = match wanted[axis] {
             Some(('=', at)) => return Ok(vec![body.kind.to_internal(at)]),
@@ -49,7 +49,7 @@ pub fn grid(machine: &Machine, places: usize, axes: &[String]) -> Result<Vec<Vec
             (Some(travel), _) => travel,
             (None, AxisKind::Rotary) => [-std::f64::consts::PI, std::f64::consts::PI],
             (None, AxisKind::Linear) => {
-                return Err(Failure::Other(format!(
+                return Err(Diagnostic::other(format!(
                     "axis `{}` states no travel: add `travel_mm` to the machine, or `--axis {}=0`",
                     body.name, body.name
                 )));

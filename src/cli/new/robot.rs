@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use abbe::files::foreign_text;
 use abbe::files::robot::dh::Convention;
 use abbe::files::robot::{self, Measured, dh, urdf};
+use abbe::model::Diagnostic;
 use clap::Args;
 
-use crate::cli::failure::Failure;
 use crate::cli::folder::NewFile;
 use crate::cli::message::{Kind, tell};
 use crate::cli::values::{self, Words};
@@ -55,7 +55,7 @@ pub struct RobotArguments {
 
 impl RobotArguments {
     /// The files of the robot; none without one.
-    pub fn files(&self) -> Result<Vec<NewFile>, Failure> {
+    pub fn files(&self) -> Result<Vec<NewFile>, Diagnostic> {
         let chain = match (&self.from_urdf, &self.from_dh, self.convention) {
             (Some(file), ..) => urdf::read(&foreign_text(file, "the URDF file")?)?.chain(file, self.tip.as_deref())?,
             (None, Some(file), Some(convention)) => {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use abbe::analysis::problem_of;
 use abbe::identify::problem::Problem;
+use abbe::model::Diagnostic;
 use abbe::model::effect::Effect;
 use abbe::model::session::Session;
 use abbe::plan::bias::{bias_table, usual_effects};
@@ -13,7 +14,7 @@ use abbe::trace::SessionFit;
 use abbe::trace::candidates::named::effect;
 
 use super::PaperArguments;
-use crate::cli::failure::Failure;
+use crate::cli::failure::command_line;
 use crate::report::paper::contents::{self, Study};
 use crate::report::paper::{Part, SUBJECTS, Subject, comparison, equations, methods};
 
@@ -21,7 +22,7 @@ use crate::report::paper::{Part, SUBJECTS, Subject, comparison, equations, metho
 const BIASING_EFFECTS: usize = 12;
 
 /// A session with its results.
-pub fn study(arguments: &PaperArguments, label: String, session: &Session) -> Result<Study, Failure> {
+pub fn study(arguments: &PaperArguments, label: String, session: &Session) -> Result<Study, Diagnostic> {
     let options = PlanOptions { effects: false, ..PlanOptions::default() };
     let analysis = plan::analyse(session, &options)?;
     let problem = problem_of(session, &options)?;
@@ -36,12 +37,12 @@ pub fn study(arguments: &PaperArguments, label: String, session: &Session) -> Re
     Ok(Study { label, problem, analysis, structure, bias, fitted })
 }
 
-fn named(problem: &Problem, ids: &[String]) -> Result<Vec<Effect>, Failure> {
+fn named(problem: &Problem, ids: &[String]) -> Result<Vec<Effect>, Diagnostic> {
     ids.iter().map(|id| Ok(effect(problem, id)?)).collect()
 }
 
 /// The requested parts that the sessions have.
-pub fn parts(arguments: &PaperArguments, studies: &[Study]) -> Result<Vec<Part>, Failure> {
+pub fn parts(arguments: &PaperArguments, studies: &[Study]) -> Result<Vec<Part>, Diagnostic> {
     let study = &studies[0];
     let mut sections = Vec::new();
     for (word, subject) in SUBJECTS {
@@ -64,12 +65,10 @@ pub fn parts(arguments: &PaperArguments, studies: &[Study]) -> Result<Vec<Part>,
         match section {
             Some(section) => sections.push(section.with_set_up_in_words(&study.problem)),
             None if is_named && *subject == Subject::Comparison => {
-                return Err(Failure::CommandLine(
-                    "`--parts comparison` needs at least two sessions; name another".into(),
-                ));
+                return Err(command_line("`--parts comparison` needs at least two sessions; name another"));
             }
             None if is_named => {
-                return Err(Failure::Other(format!(
+                return Err(Diagnostic::other(format!(
                     "`--parts {word}`: {} has no readings; name a measured session, or leave the part out",
                     arguments.sessions[0].display()
                 )));

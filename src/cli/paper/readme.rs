@@ -1,10 +1,10 @@
 //! The README of a paper's folder.
 
 use abbe::files::SourceMap;
+use abbe::model::Diagnostic;
 use abbe::model::session::Session;
 
 use super::PaperArguments;
-use crate::cli::failure::Failure;
 use crate::report::block::Body;
 use crate::report::paper::{Part, Subject};
 use crate::report::provenance::Provenance;
@@ -14,7 +14,7 @@ pub fn readme(
     arguments: &PaperArguments,
     origins: &[(Session, SourceMap)],
     sections: &[Part],
-) -> Result<String, Failure> {
+) -> Result<String, Diagnostic> {
     let mut text = String::from("# Files of a paper\n\n## This folder\n\n");
     let mut inputs = String::new();
     for (place, (session, sources)) in origins.iter().enumerate() {

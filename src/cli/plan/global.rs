@@ -2,10 +2,9 @@
 
 use abbe::identify::problem::Problem;
 use abbe::identify::quantity::Given;
+use abbe::model::Diagnostic;
 use abbe::plan::global::{GlobalAnalysis, GlobalOptions, global};
 use clap::Args;
-
-use crate::cli::failure::Failure;
 
 /// Global sensitivity.
 #[derive(Args)]
@@ -32,16 +31,16 @@ const MAX_SAMPLES: usize = 1 << 16;
 
 impl GlobalArguments {
     /// Analyses a plan.
-    pub fn run(&self, problem: &Problem, seed: u64) -> Result<GlobalAnalysis, Failure> {
+    pub fn run(&self, problem: &Problem, seed: u64) -> Result<GlobalAnalysis, Diagnostic> {
         if !self.samples.is_power_of_two() || !(8..=MAX_SAMPLES).contains(&self.samples) {
-            return Err(Failure::Other(format!(
+            return Err(Diagnostic::other(format!(
                 "`--samples {}`: a power of two from 8 to {MAX_SAMPLES} is expected",
                 self.samples
             )));
         }
         let vary = self.vary.iter().map(|text| Given::parse(text)).collect::<Result<Vec<_>, _>>()?;
         if let Some((text, _)) = self.vary.iter().zip(&vary).find(|(_, given)| given.value <= 0.0) {
-            return Err(Failure::Other(format!(
+            return Err(Diagnostic::other(format!(
                 "`--vary {text}`: half the range or a standard deviation is expected, a number above 0"
             )));
         }

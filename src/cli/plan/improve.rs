@@ -6,12 +6,12 @@ use std::path::PathBuf;
 
 use abbe::files::SourceMap;
 use abbe::identify::problem::Problem;
+use abbe::model::Diagnostic;
 use abbe::plan::design::Goal;
 use abbe::plan::improve::{self, ImproveOptions, Improvement};
 use clap::Args;
 
 use self::candidates::CandidateArguments;
-use crate::cli::failure::Failure;
 use crate::cli::{SessionArguments, next_session, values};
 
 /// Maximum number of proposed tests. Each one is a search over all candidate tests.
@@ -48,23 +48,28 @@ impl ImproveArguments {
     }
 
     /// Refuses to write a session with other mounts or priors than the session file states.
-    pub fn refuse_overrides(&self, are_given: bool) -> Result<(), Failure> {
+    pub fn refuse_overrides(&self, are_given: bool) -> Result<(), Diagnostic> {
         let message = "`--write` with `--one-spindle-ball` or `--setup-um` would write a session that is not the planned one: \
                        state the mount or the uncertainties in the session file, then plan without these options";
         match self.write.is_some() && are_given {
-            true => Err(Failure::Other(message.to_string())),
+            true => Err(Diagnostic::other(message.to_string())),
             false => Ok(()),
         }
     }
 
     /// Writes the session with the proposed tests, if requested.
-    pub fn write(&self, found: &Improvement, sources: &SourceMap, session: &SessionArguments) -> Result<(), Failure> {
+    pub fn write(
+        &self,
+        found: &Improvement,
+        sources: &SourceMap,
+        session: &SessionArguments,
+    ) -> Result<(), Diagnostic> {
         let Some(path) = &self.write else {
             return Ok(());
         };
         if found.steps.is_empty() {
             let message = format!("`--write`: no candidate test helps, so that {} is not written", path.display());
-            return Err(Failure::Other(message));
+            return Err(Diagnostic::other(message));
         }
         next_session::write(path, sources, session, |text| {
             found.steps.iter().try_for_each(|step| text.add_block(&step.proposal))
@@ -72,14 +77,14 @@ impl ImproveArguments {
     }
 
     /// Proposes tests, if they are requested.
-    pub fn run(&self, problem: &Problem) -> Result<Option<Improvement>, Failure> {
+    pub fn run(&self, problem: &Problem) -> Result<Option<Improvement>, Diagnostic> {
         if !self.asked() {
             return Ok(None);
         }
         let (candidates, by_minute) = (self.candidates.tests()?, self.candidates.by_minute());
         if let Some(pair) = &self.separate {
             let pair = pair.split_once(',').map(|(a, b)| [a.trim(), b.trim()]).filter(|[a, b]| a != b).ok_or_else(|| {
-                Failure::Other(format!(
+                Diagnostic::other(format!(
                     "`--separate {pair}`: two different effects with a comma between them are expected, as in EZC~C:h2,EAC~C:h1"
                 ))
             })?;

@@ -6,12 +6,12 @@ mod patterns;
 mod set_up;
 
 use abbe::analysis::{Plan, PlanningOptions, problem_of};
+use abbe::model::Diagnostic;
 use abbe::plan::PlanOptions;
 use abbe::plan::next_test::NextTest;
 use abbe::plan::range::shrinkages;
 use clap::Args;
 
-use super::failure::Failure;
 use super::results::Read;
 use super::{CommonArguments, Global, SessionArguments, read_session, values};
 use crate::report;
@@ -71,7 +71,7 @@ impl PlanArguments {
 pub const HELP: &str = include_str!("../help/plan.txt");
 
 /// Runs `abbe plan`.
-pub fn run(arguments: &PlanArguments, _: Global) -> Result<(), Failure> {
+pub fn run(arguments: &PlanArguments, _: Global) -> Result<(), Diagnostic> {
     let common = &arguments.common;
     let others = [&arguments.patterns.patterns, &arguments.improve.write];
     let outputs = common.output.prepared(&others.map(Option::as_ref))?;

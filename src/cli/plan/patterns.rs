@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use abbe::identify::patterns::{Patterns, patterns, usual_sizes};
 use abbe::identify::quantity::Given;
+use abbe::model::Diagnostic;
 use abbe::model::session::Session;
 use clap::Args;
 
-use crate::cli::failure::Failure;
 use crate::cli::output;
 use crate::report::patterns as present;
 
@@ -32,7 +32,7 @@ pub struct PatternArguments {
 
 impl PatternArguments {
     /// Writes the patterns.
-    pub fn run(&self, session: &Session) -> Result<Patterns, Failure> {
+    pub fn run(&self, session: &Session) -> Result<Patterns, Diagnostic> {
         let given: Vec<Given> = self.errors.iter().map(|text| Given::parse(text)).collect::<Result<_, _>>()?;
         let given = if given.is_empty() { usual_sizes(session) } else { given };
         let found = patterns(session, &given)?;

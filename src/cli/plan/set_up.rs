@@ -1,17 +1,17 @@
 //! The clearance of a device whose sizes the command line of `abbe plan` states.
 
+use abbe::model::Diagnostic;
 use abbe::model::instrument::rtest::Setting;
 use abbe::model::session::Session;
 use abbe::plan::clearance::Clearance;
 
-use crate::cli::failure::Failure;
 use crate::cli::values;
 
 /// Collisions, with the device where the R-tests of the session have it, else both on the table and in the spindle.
-pub fn faults(session: &Session, sizes: &str) -> Result<Vec<String>, Failure> {
+pub fn faults(session: &Session, sizes: &str) -> Result<Vec<String>, Diagnostic> {
     let numbers: Vec<f64> = sizes.split(',').filter_map(|size| size.trim().parse().ok()).collect();
     let &[spindle_mm, table_mm, device_height_mm, device_width_mm, shaft_mm, jig_mm] = numbers.as_slice() else {
-        return Err(Failure::Other(format!(
+        return Err(Diagnostic::other(format!(
             "`--device-mm {sizes}`: six lengths are expected: diameters of spindle and table, height and width of the device, shaft, jig"
         )));
     };

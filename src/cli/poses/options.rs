@@ -1,11 +1,11 @@
 //! What `abbe poses` asks for: tests, number, limits.
 
+use abbe::model::Diagnostic;
 use abbe::model::session::{Session, Test};
 use abbe::plan::poses::candidates::{LineOfSight, PoseLimits};
 use abbe::plan::poses::{PoseOptions, PoseSelection, measured_by, select};
 
 use super::PoseArguments;
-use crate::cli::failure::Failure;
 use crate::cli::{output, values};
 use crate::report::poses as present;
 
@@ -16,7 +16,7 @@ const MAX_CANDIDATES: usize = 20_000;
 
 impl PoseArguments {
     /// Selects the poses.
-    pub fn select(&self, session: &Session) -> Result<PoseSelection, Failure> {
+    pub fn select(&self, session: &Session) -> Result<PoseSelection, Diagnostic> {
         let options = PoseOptions {
             poses: values::count("--poses", "", self.poses, MAX_POSES)?,
             goal: self.criterion.clone(),
@@ -33,11 +33,11 @@ impl PoseArguments {
     }
 
     /// The tests whose instruments measure the poses.
-    pub fn tests<'s>(&self, session: &'s Session) -> Result<Vec<&'s Test>, Failure> {
+    pub fn tests<'s>(&self, session: &'s Session) -> Result<Vec<&'s Test>, Diagnostic> {
         let tests = measured_by(session, self.test.as_deref());
         if tests.is_empty() {
             let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
-            return Err(Failure::Other(format!(
+            return Err(Diagnostic::other(format!(
                 "`--test {}`: the session has no such test; its tests are {}",
                 self.test.as_deref().unwrap_or_default(),
                 names.join(", ")
@@ -45,7 +45,7 @@ impl PoseArguments {
         }
         let probed = |test: &&Test| test.station.probe().is_some();
         if self.height_mm.is_some() && !tests.iter().all(probed) {
-            return Err(Failure::Other(format!(
+            return Err(Diagnostic::other(format!(
                 "`--height-mm` is of the cylinder that a probe touches; this session's instrument is a {}",
                 session.instrument.word()
             )));
@@ -54,8 +54,8 @@ impl PoseArguments {
     }
 
     /// The limits of the poses.
-    pub fn limits(&self) -> Result<PoseLimits, Failure> {
-        let fault = |flag: &str, words: &str| Err(Failure::Other(format!("`{flag}`: {words}")));
+    pub fn limits(&self) -> Result<PoseLimits, Diagnostic> {
+        let fault = |flag: &str, words: &str| Err(Diagnostic::other(format!("`{flag}`: {words}")));
         let box_mm = match self.box_mm.as_deref() {
             None => None,
             Some(sides @ &[x, xx, y, yy, z, zz]) if x < xx && y < yy && z < zz => {

@@ -1,12 +1,12 @@
 //! What sheets order beside the set-up of the tests: programs and warnings.
 
 use abbe::codegen::nc::{self, Control, NcFiles};
+use abbe::model::Diagnostic;
 use abbe::model::session::Session;
 use abbe::plan::collision;
 use abbe::plan::sheet::TestSheet;
 
 use super::SheetArguments;
-use crate::cli::failure::Failure;
 use crate::printers::sheet::Order;
 
 /// The programs of the sheets, if the plan has some: poses and robots have none. Without a stated control, the motion is that
@@ -15,14 +15,14 @@ fn programs(
     session: &Session,
     arguments: &SheetArguments,
     warnings: &mut Vec<String>,
-) -> Result<Option<(&'static dyn Control, NcFiles)>, Failure> {
+) -> Result<Option<(&'static dyn Control, NcFiles)>, Diagnostic> {
     let control = arguments.control.map_or_else(|| nc::control("linuxcnc"), Ok)?;
     if arguments.control.is_none() && !nc::has_programs(session) {
         return Ok(None);
     }
     match nc::files(session, control, &arguments.motion.options()) {
         Ok(programs) => Ok(Some((control, programs))),
-        Err(error) if arguments.control.is_some() => Err(error.into()),
+        Err(error) if arguments.control.is_some() => Err(error),
         Err(error) => {
             warnings.push(format!("no program can be written: {error}"));
             Ok(None)
@@ -37,7 +37,7 @@ pub fn order(
     arguments: &SheetArguments,
     source: String,
     basic_bar_mm: Option<f64>,
-) -> Result<Order, Failure> {
+) -> Result<Order, Diagnostic> {
     let mut warnings = session.warnings.clone();
     let programs = programs(session, arguments, &mut warnings)?;
     warnings.extend(collision::unchecked(session, true));

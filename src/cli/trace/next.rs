@@ -4,14 +4,13 @@ use std::path::{Path, PathBuf};
 
 use abbe::codegen::nc::Control;
 use abbe::files::{self, ReadOptions, SourceMap};
-use abbe::model::ModelError;
+use abbe::model::Diagnostic;
 use abbe::model::document::edit::SessionText;
 use abbe::model::effect::Effect;
 use abbe::model::session::Session;
 use abbe::trace::TraceOutcome;
 use clap::Args;
 
-use crate::cli::failure::Failure;
 use crate::cli::message::{Kind, tell};
 use crate::cli::nc::motion;
 use crate::cli::next_session::proposals;
@@ -42,7 +41,7 @@ const SHEETS: &str = "sheets.html";
 
 impl NextArguments {
     /// Refuses a folder that cannot be written before the search.
-    pub fn check(&self, force: bool) -> Result<(), Failure> {
+    pub fn check(&self, force: bool) -> Result<(), Diagnostic> {
         self.next.as_ref().map_or(Ok(()), |folder| folder::check(folder, force).map(|_| ()))
     }
 
@@ -53,7 +52,7 @@ impl NextArguments {
         sources: &SourceMap,
         trace: &TraceOutcome,
         (quiet, force): (bool, bool),
-    ) -> Result<(), Failure> {
+    ) -> Result<(), Diagnostic> {
         let Some(out) = &self.next else { return Ok(()) };
         let proposed = proposals(&trace.result);
         if proposed.is_empty() {
@@ -83,7 +82,7 @@ impl NextArguments {
     }
 
     /// The programs and the sheets of the session in a folder that is not in its place yet.
-    fn documents(&self, made: &Path) -> Result<(), Failure> {
+    fn documents(&self, made: &Path) -> Result<(), Diagnostic> {
         let [session, programs, sheets] = [SESSION, PROGRAMS, SHEETS].map(|name| made.join(name).display().to_string());
         let control: Vec<&str> = self.control.iter().flat_map(|control| ["--control", control.word()]).collect();
         if !control.is_empty() {
@@ -94,7 +93,7 @@ impl NextArguments {
 }
 
 /// The session with its machine and the bodies of it.
-fn files_of(mut text: SessionText, sources: &SourceMap) -> Result<Vec<(String, Vec<u8>)>, ModelError> {
+fn files_of(mut text: SessionText, sources: &SourceMap) -> Result<Vec<(String, Vec<u8>)>, Diagnostic> {
     let mut files = Vec::new();
     if let Some(machine) = &sources.machine_text {
         files.push(("machine.toml".to_string(), machine.clone().into_bytes()));

@@ -4,6 +4,7 @@ use std::sync::Mutex;
 use std::time::Duration;
 
 use abbe::analysis::{Analysis, Given, Progress, SearchOptions};
+use abbe::model::Diagnostic;
 use abbe::model::session::Session;
 use abbe::model::words::counted;
 use abbe::trace::candidates::library;
@@ -11,7 +12,7 @@ use abbe::trace::{self, TraceOptions, TraceOutcome};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::clock::Folds;
-use crate::cli::failure::Failure;
+use crate::cli::failure::stopped;
 use crate::cli::interrupt::Interrupts;
 use crate::cli::message::{Kind, tell};
 
@@ -20,7 +21,7 @@ use crate::cli::message::{Kind, tell};
 ///
 /// # Errors
 /// If the session cannot be fitted, or its estimates mean nothing and the options do not accept it.
-pub fn trace(session: &Session, options: &SearchOptions, seed: u64, quiet: bool) -> Result<TraceOutcome, Failure> {
+pub fn trace(session: &Session, options: &SearchOptions, seed: u64, quiet: bool) -> Result<TraceOutcome, Diagnostic> {
     let folds = Folds::started();
     let bar = progress_bar(quiet);
     let interrupts = Interrupts::handled(bar.clone());
@@ -42,7 +43,7 @@ pub fn trace(session: &Session, options: &SearchOptions, seed: u64, quiet: bool)
         }
         !interrupts.came()
     };
-    let trace = TraceOutcome::run::<Failure>(&[Given::Session(session)], options, seed, &listener);
+    let trace = TraceOutcome::run(&[Given::Session(session)], options, seed, &listener);
     interrupts.end_at_once();
     bar.finish_and_clear();
     trace
@@ -52,13 +53,13 @@ pub fn trace(session: &Session, options: &SearchOptions, seed: u64, quiet: bool)
 ///
 /// # Errors
 /// If the user interrupted it.
-pub fn ended_early(trace: &TraceOutcome, model: bool) -> Result<(), Failure> {
+pub fn ended_early(trace: &TraceOutcome, model: bool) -> Result<(), Diagnostic> {
     if model {
         tell(Kind::Warning, "no model is saved: effects may be missing from it");
     }
     match trace.result.time_limit_s {
         Some(_) => Ok(()),
-        None => Err(Failure::Interrupted(trace.result.interruption())),
+        None => Err(stopped(trace.result.interruption())),
     }
 }
 
@@ -75,7 +76,7 @@ fn progress_bar(quiet: bool) -> ProgressBar {
 }
 
 /// Lists the candidates of the library with their detectability.
-pub fn list(session: &Session, options: &TraceOptions) -> Result<(), Failure> {
+pub fn list(session: &Session, options: &TraceOptions) -> Result<(), Diagnostic> {
     let families = library::families()?;
     let entries = trace::screening::screened_effects(session, options)?;
     for (number, family) in families.iter().enumerate() {

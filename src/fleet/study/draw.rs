@@ -1,6 +1,5 @@
 //! One draw of a study: a simulated session, and what the analysis makes of it.
 
-use abbe_identify::IdentifyError;
 use abbe_identify::fit;
 use abbe_identify::noise::{Noise as NoiseModel, NoiseSource};
 use abbe_identify::parameters::{Parameter, Role, largest_plausible_share};
@@ -8,6 +7,7 @@ use abbe_identify::problem::Problem;
 use abbe_identify::quantity::Given;
 use abbe_identify::results::{Estimate, TraceVerdict};
 use abbe_identify::simulate::{Simulation, simulate};
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 use abbe_trace::screening::screened_effects;
@@ -103,14 +103,10 @@ impl Study {
         if !should_continue() {
             return None;
         }
-        draw.error = match made {
-            Ok(()) => None,
-            Err(DrawError::NotObserved) => {
-                draw.not_observed = true;
-                None
-            }
-            Err(DrawError::Failed(error)) => Some(error.to_string()),
-        };
+        match made {
+            Ok(observed) => draw.not_observed = !observed,
+            Err(error) => draw.error = Some(error.to_string()),
+        }
         Some(draw)
     }
 
@@ -125,13 +121,14 @@ impl Study {
         }
     }
 
+    /// Whether the plan observes the effect.
     fn simulate(
         &self,
         draw: &mut Draw,
         [plan, effect, noise]: [usize; 3],
         random: &mut Pcg64,
         should_continue: &(dyn Fn() -> bool + Sync),
-    ) -> Result<(), DrawError> {
+    ) -> Result<bool, Diagnostic> {
         let session = &self.plans[plan];
         let (stated, noise) = (&self.file.effect[effect], &self.file.noise[noise]);
         let mut given: Vec<Given> = Vec::new();
@@ -149,23 +146,27 @@ impl Study {
         let mut tries = if stated.library { LIBRARY_TRIES } else { 1 };
         while tries > 0 {
             tries -= 1;
-            let truth =
-                if stated.library { Some(of_library(session, random)?) } else { self.effects[plan][effect].clone() };
-            let Some(truth) = truth else { break };
+            let truth = if stated.library { of_library(session, random)? } else { self.effects[plan][effect].clone() };
+            let Some(truth) = truth else {
+                if stated.library {
+                    return Ok(false);
+                }
+                break;
+            };
             draw.truth = Some(truth.id());
             let unit = truth.component.unit(&session.instrument_parameters());
             // A stated effect has its stated size, however large.
             let most = if stated.library { largest_plausible_share(unit, session.instrument) } else { f64::INFINITY };
             machine.effects = [session.effects.as_slice(), std::slice::from_ref(&truth)].concat();
-            match coefficients(session, &machine, (stated.size.0, most), noise, random) {
-                // Another effect of the library, which the plan observes.
-                Err(DrawError::NotObserved) if tries > 0 => {}
-                coefficients => {
-                    let own = coefficients?;
+            match coefficients(session, &machine, (stated.size.0, most), noise, random)? {
+                Some(own) => {
                     given.extend(own.iter().cloned());
                     true_effect = Some(DrawnEffect::of(session, &machine, truth.id(), own, noise_mm(noise))?);
                     break;
                 }
+                None if tries == 0 => return Ok(false),
+                // Another effect of the library, which the plan observes.
+                None => {}
             }
         }
         let seed = random.random();
@@ -177,7 +178,8 @@ impl Study {
         }
         let measured = session.clone().with_readings(simulated.readings);
         let truth = Truth { locations, effect: true_effect };
-        Ok(self.analyse(draw, &measured, &truth, random.random::<u32>().into(), should_continue)?)
+        self.analyse(draw, &measured, &truth, random.random::<u32>().into(), should_continue)?;
+        Ok(true)
     }
 
     fn analyse(
@@ -187,7 +189,7 @@ impl Study {
         truth: &Truth,
         seed: u64,
         should_continue: &(dyn Fn() -> bool + Sync),
-    ) -> Result<(), IdentifyError> {
+    ) -> Result<(), Diagnostic> {
         match self.file.study.analysis {
             Analysis::Fit => {
                 let (problem, found) = fit::prepare(session, seed)?;
@@ -224,18 +226,6 @@ struct Truth {
     effect: Option<DrawnEffect>,
 }
 
-/// Why a draw has no simulated session.
-enum DrawError {
-    NotObserved,
-    Failed(IdentifyError),
-}
-
-impl From<IdentifyError> for DrawError {
-    fn from(error: IdentifyError) -> DrawError {
-        DrawError::Failed(error)
-    }
-}
-
 impl Draw {
     /// Compares estimates with the true values.
     fn compare(&mut self, parameters: &[Estimate], truth: &[Given]) {
@@ -259,17 +249,17 @@ fn value(id: &str, value: f64, unit: &str) -> Given {
 }
 
 /// The parameters of a session.
-fn parameters(session: &Session) -> Result<Vec<Parameter>, IdentifyError> {
+fn parameters(session: &Session) -> Result<Vec<Parameter>, Diagnostic> {
     // No parameter depends on the noise.
     Ok(Problem::new(session, NoiseModel::white(1e-3, NoiseSource::Stated), 1)?.parameters.list)
 }
 
-/// An effect of the library that the plan observes.
-fn of_library(session: &Session, random: &mut impl Rng) -> Result<Effect, DrawError> {
+/// An effect of the library that the plan observes, if there is one.
+fn of_library(session: &Session, random: &mut impl Rng) -> Result<Option<Effect>, Diagnostic> {
     let mut effects = screened_effects(session, &TraceOptions::default())?;
     effects.retain(|effect| effect.observable);
     if effects.is_empty() {
-        return Err(DrawError::NotObserved);
+        return Ok(None);
     }
     // Families are equally probable, whatever their number of effects.
     let mut families: Vec<usize> = effects.iter().map(|effect| effect.family).collect();
@@ -277,18 +267,18 @@ fn of_library(session: &Session, random: &mut impl Rng) -> Result<Effect, DrawEr
     families.dedup();
     let family = families[random.random_range(0..families.len())];
     effects.retain(|effect| effect.family == family);
-    Ok(effects.swap_remove(random.random_range(0..effects.len())).effect)
+    Ok(Some(effects.swap_remove(random.random_range(0..effects.len())).effect))
 }
 
 /// Coefficients of the last effect of a machine, in a random direction and of the stated size: the χ² that it adds to
-/// the residual of the plan's parameters. None if one of them were larger than `most` of its physical size.
+/// the residual of the plan's parameters. `None` if the plan does not observe the effect, or one of them were larger than `most` of its physical size.
 fn coefficients(
     plan: &Session,
     machine: &Session,
     (size, most): (f64, f64),
     noise: &Noise,
     random: &mut impl Rng,
-) -> Result<Vec<Given>, DrawError> {
+) -> Result<Option<Vec<Given>>, Diagnostic> {
     let own = machine.effects.len() - 1;
     let mut largest = 0.0_f64;
     let mut coefficients: Vec<(String, f64, String)> = Vec::new();
@@ -316,13 +306,13 @@ fn coefficients(
     let inflation = (1.0 + noise.autocorrelation.0) / (1.0 - noise.autocorrelation.0);
     let strength = (chi_square / inflation).sqrt();
     if strength.is_nan() || chi_square <= SURVIVES * change / (noise_mm * noise_mm) || strength <= 0.0 {
-        return Err(DrawError::NotObserved);
+        return Ok(None);
     }
     let factor = size * SIGNIFICANT / strength;
     if factor * largest > most {
-        return Err(DrawError::NotObserved);
+        return Ok(None);
     }
-    Ok(scaled(factor))
+    Ok(Some(scaled(factor)))
 }
 
 /// Adds noise to the readings of a test, run by run, and rounds them.

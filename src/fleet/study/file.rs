@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use abbe_files::ReadOptions;
 use abbe_files::read::effect_of_document;
 use abbe_files::stamp::FileStamp;
-use abbe_identify::IdentifyError;
 use abbe_identify::simulate::{Simulation, simulate};
+use abbe_model::Diagnostic;
 use abbe_model::document::effect::Effect as EffectDocument;
 use abbe_model::document::fault::{Fault, Within};
 use abbe_model::document::value::Count;
@@ -19,7 +19,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::fleet::{BUILD, FleetError};
+use crate::fleet::BUILD;
 
 /// A study: which plans are simulated with which effects and noise, and how they are analysed.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -179,7 +179,7 @@ pub struct Study {
 ///
 /// # Errors
 /// With file and line or key of what cannot be used.
-pub fn read(path: &Path) -> Result<Study, FleetError> {
+pub fn read(path: &Path) -> Result<Study, Diagnostic> {
     let source = abbe_files::text(path, "the study file")?;
     let parsed = source.parse()?;
     let here = |fault: Fault| parsed.error_of(fault);
@@ -203,7 +203,7 @@ pub fn read(path: &Path) -> Result<Study, FleetError> {
             return Err(here(fault).into());
         }
         let own: Vec<Option<Effect>> = per_effect(&file, |effect| declared(effect, &session)).map_err(here)?;
-        let of_plan = |error: IdentifyError| {
+        let of_plan = |error: Diagnostic| {
             here(Fault::new(format!("plan `{}`: {error}", plan.name), None).at_item(item).at("plan"))
         };
         let nominal = Simulation { noise_mm: Some(0.0), ..Simulation::default() };

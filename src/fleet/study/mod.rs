@@ -10,11 +10,13 @@ pub mod file;
 pub mod summary;
 mod truth;
 
-use super::FleetError;
-use super::store::{IfClaimed, Search, Store, found_or_claimed};
-use super::unit::Done;
+use abbe_model::Diagnostic;
 use draw::Draw;
 use file::Study;
+
+use super::interrupted;
+use super::store::{IfClaimed, Search, Store, found_or_claimed};
+use super::unit::Done;
 
 /// Makes a draw if the store has none of its number. `None` if another process makes it and `if_claimed` says to skip it.
 ///
@@ -26,7 +28,7 @@ pub fn run(
     store: &Store,
     if_claimed: IfClaimed,
     should_continue: &(dyn Fn() -> bool + Sync),
-) -> Result<Option<(Done, Draw)>, FleetError> {
+) -> Result<Option<(Done, Draw)>, Diagnostic> {
     let found = || store.draw(&study.key, number);
     let claim = || store.claim_draw(&study.key, number);
     let _claim = match found_or_claimed(found, claim, if_claimed, should_continue)? {
@@ -35,7 +37,7 @@ pub fn run(
         Search::Claimed(claim) => claim,
     };
     let draw = if should_continue() { study.draw(number, should_continue) } else { None };
-    let draw = draw.ok_or(FleetError::Interrupted)?;
+    let draw = draw.ok_or_else(interrupted)?;
     store.write_draw(&study.key, &draw)?;
     Ok(Some((Done::Computed, draw)))
 }

@@ -1,11 +1,11 @@
 //! The true effect of a draw: its readings alone, and whether another effect is the same under another name.
 
-use abbe_identify::IdentifyError;
 use abbe_identify::fit;
 use abbe_identify::noise::{Noise as NoiseModel, NoiseSource};
 use abbe_identify::problem::Problem;
 use abbe_identify::quantity::Given;
 use abbe_identify::simulate::{Simulation, simulate};
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 
@@ -32,7 +32,7 @@ impl DrawnEffect {
         id: String,
         coefficients: Vec<Given>,
         noise_mm: f64,
-    ) -> Result<DrawnEffect, IdentifyError> {
+    ) -> Result<DrawnEffect, Diagnostic> {
         let alone = alone(plan, machine, coefficients)?;
         let chi_square = chi_square(&alone, noise_mm)?;
         Ok(DrawnEffect { id, alone, noise_mm, chi_square })
@@ -48,7 +48,7 @@ impl DrawnEffect {
 }
 
 /// The readings of a plan on a machine with given coefficients and no other error, without noise.
-pub(super) fn alone(plan: &Session, machine: &Session, given: Vec<Given>) -> Result<Session, IdentifyError> {
+pub(super) fn alone(plan: &Session, machine: &Session, given: Vec<Given>) -> Result<Session, Diagnostic> {
     let exact = Simulation { given, noise_mm: Some(0.0), ..Simulation::default() };
     let exact_machine = Session { resolution_mm: None, ..machine.clone() };
     let readings = simulate(&exact_machine, &exact)?.readings;
@@ -61,7 +61,7 @@ pub(super) fn noise_mm(noise: &Noise) -> f64 {
 }
 
 /// χ² of the fit of a session. The model has no noise to estimate: it is stated.
-pub(super) fn chi_square(session: &Session, noise_mm: f64) -> Result<f64, IdentifyError> {
+pub(super) fn chi_square(session: &Session, noise_mm: f64) -> Result<f64, Diagnostic> {
     let problem = Problem::new(session, NoiseModel::white(noise_mm, NoiseSource::Stated), 1)?;
     Ok(fit::fit(&problem, None)?.chi_square)
 }

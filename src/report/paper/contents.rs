@@ -1,8 +1,8 @@
 //! What the sections hold: selections of the tables and figures of a plan and of a fit.
 
-use abbe::identify::IdentifyError;
 use abbe::identify::problem::Problem;
 use abbe::identify::series::{paths, views};
+use abbe::model::Diagnostic;
 use abbe::model::words::counted;
 use abbe::plan::bias::BiasTable;
 use abbe::plan::results::PlanAnalysis;
@@ -71,7 +71,7 @@ pub fn set_up(study: &Study) -> Part {
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn sensitivity(study: &Study) -> Result<Part, IdentifyError> {
+pub fn sensitivity(study: &Study) -> Result<Part, Diagnostic> {
     let nominal = vec![0.0; study.problem.parameters.list.len()];
     let figures = match &study.fitted {
         Some(fitted) => curves::sensitivities(&fitted.problem, &fitted.fit.beta)?,
@@ -236,7 +236,7 @@ pub fn bias(study: &Study) -> Part {
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn trace(study: &Study) -> Result<Option<Part>, IdentifyError> {
+pub fn trace(study: &Study) -> Result<Option<Part>, Diagnostic> {
     let Some(fitted) = &study.fitted else { return Ok(None) };
     let series = views(&fitted.problem, &fitted.fit, None)?;
     let plots = SessionPlots::new(&fitted.problem, &series);

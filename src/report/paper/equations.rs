@@ -1,8 +1,10 @@
 //! The equations of the tests in first order, the derivatives of their readings, and the nomenclature.
 
+use abbe::codegen::error::NO_POLYNOMIAL;
 use abbe::codegen::print::{Numbering, Style, TestEquations, language};
-use abbe::codegen::{Arrangement, CodegenError, Equation, Options, Order, SessionTest, Symbols, check};
+use abbe::codegen::{Arrangement, Equation, Options, Order, SessionTest, Symbols, check};
 use abbe::equation::EquationParameters;
+use abbe::model::Diagnostic;
 use abbe::model::session::{Session, Test};
 
 use super::contents::Study;
@@ -19,7 +21,7 @@ const LONGEST: usize = 40_000;
 ///
 /// # Errors
 /// If the equation of a test cannot be made or does not agree with the chain.
-pub fn part(study: &Study, two_column: bool) -> Result<Part, CodegenError> {
+pub fn part(study: &Study, two_column: bool) -> Result<Part, Diagnostic> {
     let session = &study.problem.session;
     let style = Style {
         numbering: Numbering::Last,
@@ -60,11 +62,11 @@ pub fn part(study: &Study, two_column: bool) -> Result<Part, CodegenError> {
 
 /// The equations of all tests in first order. `None` if they fill pages, or if a reading is the root of what the instrument's
 /// unknowns change, as the distance from a station that is searched for is.
-fn in_first_order(session: &Session, style: &Style) -> Result<Option<Formula>, CodegenError> {
+fn in_first_order(session: &Session, style: &Style) -> Result<Option<Formula>, Diagnostic> {
     let form = Form { order: Order::First, arrangement: Arrangement::Single };
     let made: Result<Vec<_>, _> = session.tests.iter().map(|test| form.of(session, test)).collect();
     let made = match made {
-        Err(CodegenError::NoPolynomial { .. }) => return Ok(None),
+        Err(error) if error.code == NO_POLYNOMIAL => return Ok(None),
         made => made?,
     };
     let checked = made.iter().map(|(equation, source)| check(equation, source)).collect::<Result<Vec<_>, _>>()?;
@@ -90,7 +92,7 @@ struct Form {
 
 impl Form {
     /// The equation of a test with the errors and effects of its session.
-    fn of<'s>(&self, session: &'s Session, test: &'s Test) -> Result<(Equation, SessionTest<'s>), CodegenError> {
+    fn of<'s>(&self, session: &'s Session, test: &'s Test) -> Result<(Equation, SessionTest<'s>), Diagnostic> {
         let source = SessionTest::new(session, test)?;
         let parameters = EquationParameters::declared(session, test);
         let options = Options {

@@ -1,9 +1,9 @@
 //! The report of an analysed plan, and the sections that a paper shares with it.
 
 use abbe::document::StatedPlan;
-use abbe::identify::IdentifyError;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::NextStep;
+use abbe::model::Diagnostic;
 use abbe::model::words::counted;
 use abbe::plan::results::{ErrorAnalysis, PlanAnalysis};
 
@@ -35,7 +35,7 @@ pub fn report(
     stated: &StatedPlan<'_>,
     commands: &Commands,
     figures: bool,
-) -> Result<Report, IdentifyError> {
+) -> Result<Report, Diagnostic> {
     let analysis = stated.result;
     let mut report = Report::new(format!("Plan for {}", problem.session.machine.name));
     report.warnings.clone_from(&analysis.warnings);

@@ -1,10 +1,10 @@
 //! Plots of derived quantities: histogram and time series of the residual, spectra, and sensitivities to single errors.
 
-use abbe::identify::IdentifyError;
 use abbe::identify::problem::Problem;
 use abbe::identify::series::lengths;
 use abbe::identify::series::sensitivities::{self as sensitivity, Sensitivity, TestSensitivities};
 use abbe::identify::series::spectrum::Spectrum;
+use abbe::model::Diagnostic;
 use abbe::model::effect::shape::Harmonic;
 use abbe::model::effect::{Effect, Shape};
 use abbe::model::words::counted;
@@ -174,7 +174,7 @@ pub fn spectrum_plot(spectrum: &Spectrum, maximum: f64, effects: &[Effect]) -> F
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn sensitivities(problem: &Problem, beta: &[f64]) -> Result<Vec<Figure>, IdentifyError> {
+pub fn sensitivities(problem: &Problem, beta: &[f64]) -> Result<Vec<Figure>, Diagnostic> {
     const DIVISION_UM: f64 = 5.0;
     if problem.folds.kind.is_poses() {
         return Ok(pose_sensitivities(&sensitivity::over_poses(problem, beta)?));

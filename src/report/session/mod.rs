@@ -15,12 +15,12 @@ pub mod residuals;
 pub mod sky;
 pub mod workspace;
 
-use abbe::identify::IdentifyError;
 use abbe::identify::fit::Fit;
 use abbe::identify::parameters::Role;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::Estimate;
 use abbe::identify::series::{Cause, correlation};
+use abbe::model::Diagnostic;
 use serde_json::json;
 
 use self::plots::SessionPlots;
@@ -123,7 +123,7 @@ pub fn correlation_map(ids: Vec<String>, rows: Vec<Vec<Option<f64>>>) -> Figure 
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn model(report: &mut Report, problem: &Problem, beta: &[f64]) -> Result<(), IdentifyError> {
+pub fn model(report: &mut Report, problem: &Problem, beta: &[f64]) -> Result<(), Diagnostic> {
     report.section("Sensitivity of each test");
     report.figures(curves::sensitivities(problem, beta)?);
     machine(report, problem);

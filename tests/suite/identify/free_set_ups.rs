@@ -8,11 +8,11 @@ use std::sync::Arc;
 
 use abbe::files::robot::dh::{Convention, DhRow, Table};
 use abbe::files::{self, ReadOptions};
-use abbe::identify::IdentifyError;
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::noise::NoiseSource;
 use abbe::identify::plausibility::{SuggestionKind, accepted};
 use abbe::identify::results::{Finding, FitResult};
+use abbe::model::Diagnostic;
 use abbe::model::axis::AxisKind;
 use abbe::model::session::Session;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
@@ -226,7 +226,7 @@ fn as_it_is(pose: Isometry3<f64>) -> ([f64; 3], [f64; 3]) {
     (pose.translation.vector.into(), pose.rotation.scaled_axis().into())
 }
 
-fn fitted(session: &Session) -> Result<FitResult, IdentifyError> {
+fn fitted(session: &Session) -> Result<FitResult, Diagnostic> {
     let (problem, fit) = prepare(session, 1)?;
     report(&problem, &fit)
 }

@@ -1,8 +1,8 @@
 //! Certified nonlinear regressions of the NIST StRD, solved by the Gauss–Newton iteration that fits machines.
 
-use abbe::identify::IdentifyError;
 use abbe::identify::numerics::least_squares::{LeastSquares, Scaling, minimise};
 use abbe::identify::numerics::triangle::Triangle;
+use abbe::model::Diagnostic;
 use nalgebra::{Const, SVector};
 use num_dual::{Derivative, DualNum, DualSVec64};
 use test_needs::data;
@@ -53,7 +53,7 @@ impl<const N: usize, F: Fn(&[Dual<N>; N], f64) -> Dual<N>> LeastSquares for Regr
         N
     }
 
-    fn linearise(&self, b: &[f64]) -> Result<Triangle, IdentifyError> {
+    fn linearise(&self, b: &[f64]) -> Result<Triangle, Diagnostic> {
         let b: [Dual<N>; N] = std::array::from_fn(|k| {
             let mut seed = SVector::<f64, N>::zeros();
             seed[k] = 1.0;

@@ -15,10 +15,10 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::numerics::gain::{ObservableSubspace, gain_of_few};
 use abbe_identify::numerics::parallel;
 use abbe_identify::numerics::symmetric::pseudo_inverse;
+use abbe_model::Diagnostic;
 use faer::Mat;
 
 use super::gram::{ChosenEffect, Gram, Projection, SegmentProducts, stored};
@@ -76,7 +76,7 @@ impl<'m> TrainedModel<'m> {
     ///
     /// # Errors
     /// If products are not finite.
-    pub fn new(gram: &'m Gram<'m>, chosen: &[usize], folds: &[usize]) -> Result<Self, IdentifyError> {
+    pub fn new(gram: &'m Gram<'m>, chosen: &[usize], folds: &[usize]) -> Result<Self, Diagnostic> {
         let projection = gram.projection(folds)?;
         let chosen: Vec<Arc<ChosenEffect>> =
             chosen.iter().map(|candidate| projection.chosen(gram, *candidate)).collect::<Result<_, _>>()?;
@@ -104,7 +104,7 @@ impl<'m> TrainedModel<'m> {
         Ok(TrainedModel { gram, projection, folds, chosen, inverse, along, coefficients, segments })
     }
 
-    pub(super) fn segment(&self, number: usize) -> Result<Arc<Segment>, IdentifyError> {
+    pub(super) fn segment(&self, number: usize) -> Result<Arc<Segment>, Diagnostic> {
         stored(&self.segments, &number, || {
             let products = self.projection.products(self.gram, number, &|| true)?;
             let mut with_chosen = Mat::zeros(self.along.len(), products.g.len());
@@ -120,7 +120,7 @@ impl<'m> TrainedModel<'m> {
     }
 
     /// A candidate in its segment: the segment, its columns and its square.
-    fn place(&self, candidate: usize) -> Result<(Arc<Segment>, Range<usize>, Range<usize>), IdentifyError> {
+    fn place(&self, candidate: usize) -> Result<(Arc<Segment>, Range<usize>, Range<usize>), Diagnostic> {
         let (segment, local) = self.gram.place(candidate);
         let (columns, square) = (self.gram.columns_of(segment, local), self.gram.square_of(segment, local));
         Ok((self.segment(segment)?, columns, square))
@@ -130,7 +130,7 @@ impl<'m> TrainedModel<'m> {
     ///
     /// # Errors
     /// If products are not finite.
-    pub fn projected(&self, candidate: usize) -> Result<Projected, IdentifyError> {
+    pub fn projected(&self, candidate: usize) -> Result<Projected, Diagnostic> {
         let (segment, columns, square) = self.place(candidate)?;
         Ok(self.projected_in(&segment, columns, square))
     }
@@ -166,7 +166,7 @@ impl<'m> TrainedModel<'m> {
     ///
     /// # Errors
     /// If products are not finite.
-    pub fn gain(&self, candidate: usize) -> Result<Gain, IdentifyError> {
+    pub fn gain(&self, candidate: usize) -> Result<Gain, Diagnostic> {
         let (segment, columns, square) = self.place(candidate)?;
         Ok(self.gain_in(candidate, &segment, columns, square))
     }
@@ -213,7 +213,7 @@ impl<'m> TrainedModel<'m> {
     ///
     /// # Errors
     /// If products are not finite.
-    pub fn gains(&self, usable: &(dyn Fn(usize) -> bool + Sync)) -> Result<Vec<Gain>, IdentifyError> {
+    pub fn gains(&self, usable: &(dyn Fn(usize) -> bool + Sync)) -> Result<Vec<Gain>, Diagnostic> {
         self.remaining_gains(Vec::new(), usable)
     }
 
@@ -225,7 +225,7 @@ impl<'m> TrainedModel<'m> {
         &self,
         mut known: Vec<Gain>,
         usable: &(dyn Fn(usize) -> bool + Sync),
-    ) -> Result<Vec<Gain>, IdentifyError> {
+    ) -> Result<Vec<Gain>, Diagnostic> {
         let (first, total) = (known.len(), self.gram.candidates());
         let chunks: Vec<Range<usize>> =
             (first..total).step_by(AT_ONCE).map(|start| start..(start + AT_ONCE).min(total)).collect();
@@ -262,7 +262,7 @@ impl<'m> TrainedModel<'m> {
         candidate: usize,
         effect: usize,
         coefficients: &[f64],
-    ) -> Result<f64, IdentifyError> {
+    ) -> Result<f64, Diagnostic> {
         let Projected { d, own, .. } = self.projected(candidate)?;
         let (g, projected) = self.with_signature(candidate, effect, coefficients)?;
         let subspace = ObservableSubspace::of(&d, &own);
@@ -274,7 +274,7 @@ impl<'m> TrainedModel<'m> {
     ///
     /// # Errors
     /// If products are not finite.
-    pub fn difference_square(&self, [one, other]: [usize; 2]) -> Result<f64, IdentifyError> {
+    pub fn difference_square(&self, [one, other]: [usize; 2]) -> Result<f64, Diagnostic> {
         let [of_one, of_other] = [self.with_candidate(one)?.1, self.with_candidate(other)?.1];
         let (with_one, square) = self.with_signature(one, other, &of_other)?;
         let product: f64 = of_one.iter().zip(&with_one).map(|(c, g)| c * g).sum();
@@ -288,7 +288,7 @@ impl<'m> TrainedModel<'m> {
         candidate: usize,
         effect: usize,
         coefficients: &[f64],
-    ) -> Result<(Vec<f64>, f64), IdentifyError> {
+    ) -> Result<(Vec<f64>, f64), Diagnostic> {
         let signature = self.projection.chosen(self.gram, effect)?;
         // The signature's products with the chosen effects and with the candidate, the fitted model projected out.
         let along = |products: &Mat<f64>, column: usize| -> f64 {
@@ -320,7 +320,7 @@ impl<'m> TrainedModel<'m> {
     ///
     /// # Errors
     /// If products are not finite.
-    pub fn with_candidate(&self, candidate: usize) -> Result<(Vec<f64>, Vec<f64>), IdentifyError> {
+    pub fn with_candidate(&self, candidate: usize) -> Result<(Vec<f64>, Vec<f64>), Diagnostic> {
         let Projected { d, g, own } = self.projected(candidate)?;
         let of_candidate = ObservableSubspace::of(&d, &own).solve(&g);
         let (segment, columns, _) = self.place(candidate)?;

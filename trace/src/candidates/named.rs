@@ -1,7 +1,8 @@
 //! Effects of the library by their identifiers.
 
-use abbe_identify::error::IdentifyError;
+use abbe_identify::error;
 use abbe_identify::problem::Problem;
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 
 use super::library;
@@ -10,7 +11,7 @@ use super::library;
 ///
 /// # Errors
 /// If the library has no such effect for this plan.
-pub fn add(problem: &mut Problem, id: &str) -> Result<(), IdentifyError> {
+pub fn add(problem: &mut Problem, id: &str) -> Result<(), Diagnostic> {
     if problem.parameters.effects.iter().any(|effect| effect.id() == id) {
         return Ok(());
     }
@@ -21,7 +22,7 @@ pub fn add(problem: &mut Problem, id: &str) -> Result<(), IdentifyError> {
 ///
 /// # Errors
 /// If the library has no such effect for this plan.
-pub fn effect(problem: &Problem, id: &str) -> Result<Effect, IdentifyError> {
+pub fn effect(problem: &Problem, id: &str) -> Result<Effect, Diagnostic> {
     let candidates = library::candidates(problem)?;
     let Some(candidate) = candidates.iter().find(|candidate| candidate.effect.id() == id) else {
         let before_shape = id.split(':').next().unwrap_or(id);
@@ -30,7 +31,7 @@ pub fn effect(problem: &Problem, id: &str) -> Result<Effect, IdentifyError> {
         alike.dedup();
         alike.truncate(6);
         let these = "identifiers are component~driver:shape, as in EZC~C:h2; similar ones:";
-        return Err(IdentifyError::unknown("the library of effects for this plan", "effect", id, these, alike));
+        return Err(error::unknown("the library of effects for this plan", "effect", id, these, alike));
     };
     Ok(candidate.effect.clone())
 }

@@ -1,9 +1,9 @@
 //! The best score of all candidates on each null draw: the null distribution of one round of the search.
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::numerics::gain::ObservableSubspace;
 use abbe_identify::numerics::parallel;
 use abbe_identify::numerics::tails::{ln_chi_square_tail, most_evidence};
+use abbe_model::Diagnostic;
 use faer::Mat;
 
 use super::gain::{AT_ONCE, TrainedModel};
@@ -13,7 +13,7 @@ impl TrainedModel<'_> {
     ///
     /// # Errors
     /// If products are not finite.
-    pub fn null_best(&self, chosen: &[usize], costs: &[f64], variance: f64) -> Result<Vec<f64>, IdentifyError> {
+    pub fn null_best(&self, chosen: &[usize], costs: &[f64], variance: f64) -> Result<Vec<f64>, Diagnostic> {
         let draws = self.gram.draws();
         let mut h = Mat::zeros(draws, self.along.len());
         let mut column = 0;
@@ -46,7 +46,7 @@ impl TrainedModel<'_> {
         costs: &[f64],
         variance: f64,
         h: &Mat<f64>,
-    ) -> Result<Vec<f64>, IdentifyError> {
+    ) -> Result<Vec<f64>, Diagnostic> {
         let draws = h.nrows();
         let mut best = vec![f64::NEG_INFINITY; draws];
         let mut g: Vec<f64> = Vec::new();

@@ -8,10 +8,10 @@
 //! Between two positions of the dictionary a step is approximated by two. Selected positions are therefore moved by
 //! fractions of the grid, and those that this makes superfluous are removed.
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::numerics::solve::solve_square;
 use abbe_identify::numerics::tails::ln_chi_square_tail;
 use abbe_identify::numerics::tolerances::MIN_OBSERVABLE;
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 use faer::Mat;
 use statrs::function::gamma::ln_gamma;
@@ -110,7 +110,7 @@ pub fn best_step_table(
     number: usize,
     dictionary: &Candidate,
     variance: f64,
-) -> Result<Option<StepTable>, IdentifyError> {
+) -> Result<Option<StepTable>, Diagnostic> {
     let at = dictionary.effect.shape.positions();
     if at.is_empty() {
         return Ok(None);

@@ -1,6 +1,6 @@
 //! Adds the best candidate.
 
-use abbe_identify::error::IdentifyError;
+use abbe_model::Diagnostic;
 
 use super::{Move, Proposal};
 use crate::state::{ALL, SearchBranch, SearchState, SelectedEffect};
@@ -16,7 +16,7 @@ pub struct Add {
 }
 
 impl Move for Add {
-    fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, IdentifyError> {
+    fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, Diagnostic> {
         let SearchBranch { folds, mut selected } = search.selection.branches[branch].clone();
         let chosen = search.selection.branches[branch].chosen();
         let known = search.tune_near_best(&chosen, &folds)?;

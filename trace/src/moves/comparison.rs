@@ -1,6 +1,6 @@
 //! Compares sets of effects with the selected set.
 
-use abbe_identify::error::IdentifyError;
+use abbe_model::Diagnostic;
 
 use super::Proposal;
 use crate::constants::{INDISTINGUISHABLE, MAX_COMPARED};
@@ -23,7 +23,7 @@ pub struct SetComparison {
 
 impl SetComparison {
     /// Starts a comparison with the selected set. `None` if the set is empty or too large.
-    pub fn with_selected(search: &SearchState<'_>, branch: usize) -> Result<Option<SetComparison>, IdentifyError> {
+    pub fn with_selected(search: &SearchState<'_>, branch: usize) -> Result<Option<SetComparison>, Diagnostic> {
         let folds = search.selection.branches[branch].folds.clone();
         let chosen = search.selection.branches[branch].chosen();
         if !(1..=MAX_COMPARED).contains(&chosen.len()) {
@@ -48,7 +48,7 @@ impl SetComparison {
         beside: &[usize],
         one: usize,
         added: &[usize],
-    ) -> Result<(), IdentifyError> {
+    ) -> Result<(), Diagnostic> {
         let value = search.objective_with(beside, one, &self.folds)?;
         if value <= self.best.1 {
             return Ok(());

@@ -1,7 +1,7 @@
 //! Merges effects that follow one axis, or waves along several axes, into one effect.
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::numerics::parallel;
+use abbe_model::Diagnostic;
 
 use super::{Move, Proposal};
 use crate::state::{SearchBranch, SearchState, SelectedEffect};
@@ -12,7 +12,7 @@ use crate::state::{SearchBranch, SearchState, SelectedEffect};
 pub struct Merge;
 
 impl Move for Merge {
-    fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, IdentifyError> {
+    fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, Diagnostic> {
         let mut changed = false;
         for driver in search.axes_followed(branch) {
             let (whole, _) = search.following(&driver, branch);
@@ -39,7 +39,7 @@ impl Move for Merge {
 }
 
 /// A group of effects merged into the one effect with the largest objective.
-fn merged(search: &mut SearchState<'_>, branch: usize, group: &[usize]) -> Result<Option<Proposal>, IdentifyError> {
+fn merged(search: &mut SearchState<'_>, branch: usize, group: &[usize]) -> Result<Option<Proposal>, Diagnostic> {
     let columns: usize = group.iter().map(|c| search.gram.count(*c)).sum();
     let curves = group.len() > 2 || columns > 2 && search.is_composed(group);
     if group.len() < 2 && !curves {
@@ -61,7 +61,7 @@ fn merged(search: &mut SearchState<'_>, branch: usize, group: &[usize]) -> Resul
     let variance = search.variance(&without);
     let present = search.objective(group, &rest, &folds)?;
     let one = |k: usize| Ok(search.score(pool[k], &without.gain(pool[k])?, variance) - search.choice());
-    let values = parallel::map(pool.len(), &one).into_iter().collect::<Result<Vec<f64>, IdentifyError>>()?;
+    let values = parallel::map(pool.len(), &one).into_iter().collect::<Result<Vec<f64>, Diagnostic>>()?;
     let best = pool.iter().copied().zip(values).max_by(|a, b| a.1.total_cmp(&b.1));
     let p_value = grouped.iter().map(|selected| selected.p_value).fold(1.0, f64::min);
     Ok(best.map(|(candidate, one)| {

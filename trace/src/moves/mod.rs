@@ -30,8 +30,8 @@ pub mod withdraw;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::numerics::parallel;
+use abbe_model::Diagnostic;
 
 use super::Progress;
 use super::interrupt::Interrupt;
@@ -43,8 +43,8 @@ pub trait Move: Sync {
     /// Tries the move on one branch. Returns whether its selected effects changed.
     ///
     /// # Errors
-    /// If products are not finite, or [`IdentifyError::Interrupted`] if the caller stopped the trace.
-    fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, IdentifyError>;
+    /// If products are not finite, or `INTERRUPTED` if the caller stopped the trace.
+    fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, Diagnostic>;
 
     /// Whether the branches without a fold are tried only if the branch on all readings changed.
     fn follows_all_readings(&self) -> bool {
@@ -94,7 +94,7 @@ pub fn named(name: MoveName) -> &'static dyn Move {
 ///
 /// # Errors
 /// See [`Move::try_on`].
-pub fn on_every_branch(tried: &dyn Move, search: &mut SearchState<'_>) -> Result<bool, IdentifyError> {
+pub fn on_every_branch(tried: &dyn Move, search: &mut SearchState<'_>) -> Result<bool, Diagnostic> {
     let all = tried.try_on(search, ALL)?;
     search.forget_unselected(ALL);
     if search.policy.folds_follow {
@@ -114,7 +114,7 @@ pub fn on_every_branch(tried: &dyn Move, search: &mut SearchState<'_>) -> Result
             }
             Ok(own)
         });
-        let tried: Vec<SearchState<'_>> = tried.into_iter().collect::<Result<_, IdentifyError>>()?;
+        let tried: Vec<SearchState<'_>> = tried.into_iter().collect::<Result<_, Diagnostic>>()?;
         for (fold, own) in tried.into_iter().enumerate() {
             search.adopt(ALL + 1 + fold, &own, common);
         }
@@ -126,7 +126,7 @@ pub fn on_every_branch(tried: &dyn Move, search: &mut SearchState<'_>) -> Result
 ///
 /// # Errors
 /// See [`Move::try_on`].
-pub fn run(name: MoveName, search: &mut SearchState<'_>) -> Result<bool, IdentifyError> {
+pub fn run(name: MoveName, search: &mut SearchState<'_>) -> Result<bool, Diagnostic> {
     let tried = named(name);
     if !tried.is_due(search.selected().len()) {
         return Ok(false);

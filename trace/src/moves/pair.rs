@@ -1,6 +1,6 @@
 //! Searches two effects jointly in place of one or two.
 
-use abbe_identify::error::IdentifyError;
+use abbe_model::Diagnostic;
 
 use super::Move;
 use super::comparison::SetComparison;
@@ -12,7 +12,7 @@ use crate::state::SearchState;
 pub struct Pair;
 
 impl Move for Pair {
-    fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, IdentifyError> {
+    fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, Diagnostic> {
         let Some(mut comparison) = SetComparison::with_selected(search, branch)? else {
             return Ok(false);
         };

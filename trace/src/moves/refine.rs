@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use abbe_identify::error::IdentifyError;
+use abbe_model::Diagnostic;
 
 use super::Move;
 use super::comparison::SetComparison;
@@ -14,7 +14,7 @@ use crate::state::SearchState;
 pub struct Refine;
 
 impl Move for Refine {
-    fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, IdentifyError> {
+    fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, Diagnostic> {
         let Some(mut comparison) = SetComparison::with_selected(search, branch)? else {
             return Ok(false);
         };
@@ -43,12 +43,7 @@ impl Move for Refine {
 
 /// The best candidates beside some effects: one for each identifier other than that of `but`, and one of equivalent
 /// candidates.
-fn next_best(
-    search: &SearchState<'_>,
-    base: &[usize],
-    but: usize,
-    folds: &[usize],
-) -> Result<Vec<usize>, IdentifyError> {
+fn next_best(search: &SearchState<'_>, base: &[usize], but: usize, folds: &[usize]) -> Result<Vec<usize>, Diagnostic> {
     let mut ids = HashSet::from([search.effect(but).id()]);
     let mut ranked = search.ranked(base, folds, |candidate| ids.insert(search.effect(candidate).id()))?;
     ranked.truncate(search.effort(folds).tried);

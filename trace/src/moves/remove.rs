@@ -1,6 +1,6 @@
 //! Removes effects that later additions have made insignificant.
 
-use abbe_identify::error::IdentifyError;
+use abbe_model::Diagnostic;
 
 use super::{Move, Proposal};
 use crate::state::SearchState;
@@ -12,7 +12,7 @@ pub struct Remove {
 }
 
 impl Move for Remove {
-    fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, IdentifyError> {
+    fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, Diagnostic> {
         let folds = search.selection.branches[branch].folds.clone();
         let mut changed = false;
         loop {
@@ -22,7 +22,7 @@ impl Move for Remove {
                 let candidate = others.remove(k);
                 Ok((k, search.score_beside(candidate, &others, &folds)?))
             });
-            let scored: Vec<(usize, f64)> = scored.collect::<Result<_, IdentifyError>>()?;
+            let scored: Vec<(usize, f64)> = scored.collect::<Result<_, Diagnostic>>()?;
             let Some((k, score)) = scored.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)) else {
                 return Ok(changed);
             };

@@ -1,6 +1,6 @@
 //! Exchanges a wrong effect for the true one.
 
-use abbe_identify::error::IdentifyError;
+use abbe_model::Diagnostic;
 
 use super::{Move, Proposal};
 use crate::constants::{INDISTINGUISHABLE, SWAP_EVERY, SWAP_EVERY_ROUND_UP_TO};
@@ -11,7 +11,7 @@ use crate::state::{SearchBranch, SearchState};
 pub struct Swap;
 
 impl Move for Swap {
-    fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, IdentifyError> {
+    fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, Diagnostic> {
         let mut changed = false;
         for k in 0..search.selection.branches[branch].selected.len() {
             if let Some(proposal) = exchanged(search, branch, k)? {
@@ -27,7 +27,7 @@ impl Move for Swap {
 }
 
 /// The `k`-th effect exchanged for the best candidate beside the others, in its simplest form.
-fn exchanged(search: &mut SearchState<'_>, branch: usize, k: usize) -> Result<Option<Proposal>, IdentifyError> {
+fn exchanged(search: &mut SearchState<'_>, branch: usize, k: usize) -> Result<Option<Proposal>, Diagnostic> {
     let SearchBranch { folds, mut selected } = search.selection.branches[branch].clone();
     let mut others = search.selection.branches[branch].chosen();
     let present = others.remove(k);

@@ -1,6 +1,6 @@
 //! Withdraws effects that explain nothing.
 
-use abbe_identify::error::IdentifyError;
+use abbe_model::Diagnostic;
 use abbe_model::driver::Driver;
 
 use super::{Move, Proposal};
@@ -15,7 +15,7 @@ pub struct Withdraw {
 }
 
 impl Move for Withdraw {
-    fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, IdentifyError> {
+    fn try_on(&self, search: &mut SearchState<'_>, branch: usize) -> Result<bool, Diagnostic> {
         let mut changed = false;
         for driver in search.axes_followed(branch) {
             let (group, rest) = search.following(&driver, branch);
@@ -47,7 +47,7 @@ fn objective_of_test_curves(
     intervals: usize,
     rest: &[usize],
     folds: &[usize],
-) -> Result<Option<f64>, IdentifyError> {
+) -> Result<Option<f64>, Diagnostic> {
     let curves = search.test_curves(driver, intervals);
     if curves.is_empty() {
         return Ok(None);

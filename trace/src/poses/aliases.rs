@@ -3,10 +3,10 @@
 //! As in the search without families, an alias raises χ² by at most 4, and explains at least half of what the found
 //! effect explains. χ² is that of the tempered likelihood, with the scales of the families.
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::aliases_at_solution;
 use abbe_identify::fit::families::FoldEquations;
 use abbe_identify::parameters::Role;
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 
 use super::PoseSearch;
@@ -29,12 +29,8 @@ pub(crate) struct PoseAlias {
 /// Finds the aliases of the single effects of a model, whose uncertainties then cover them.
 ///
 /// # Errors
-/// If a model cannot be evaluated, or [`IdentifyError::Interrupted`].
-pub(super) fn find(
-    model: &mut PoseSearch,
-    library: &Library<'_>,
-    interrupt: Interrupt<'_>,
-) -> Result<(), IdentifyError> {
+/// If a model cannot be evaluated, or `INTERRUPTED`.
+pub(super) fn find(model: &mut PoseSearch, library: &Library<'_>, interrupt: Interrupt<'_>) -> Result<(), Diagnostic> {
     let first = model.problem.parameters.effects.len() - model.effects.len();
     let single: Vec<usize> = (0..model.effects.len()).filter(|k| model.effects[*k].is_single).collect();
     let without = |k: &usize| model.problem.residuals(&beta_without(model, *k));
@@ -70,7 +66,7 @@ fn of_effect(
     k: usize,
     nearest: Vec<&Candidate>,
     interrupt: Interrupt<'_>,
-) -> Result<Vec<PoseAlias>, IdentifyError> {
+) -> Result<Vec<PoseAlias>, Diagnostic> {
     let (found, problem) = (&model.effects[k].effect, &model.problem);
     let is_own = |j: &usize| is_own(model, k, *j);
     // The families keep the scales, and the readings the noise, of the model with the effect.

@@ -6,10 +6,10 @@
 //! joint, and the compliance of every joint under the gravity moment about its axis. A group is accepted if the
 //! held-out error over blocks of joint space decreases by more than the standard error of the decrease.
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::families::{FoldEquations, Scales, families};
 use abbe_identify::fit::with_families_linearised;
 use abbe_identify::problem::Problem;
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::driver::Driver;
@@ -134,14 +134,14 @@ struct Accepted {
 /// the spectra are proposed, `most` the maximum number of effects.
 ///
 /// # Errors
-/// If the model with the families cannot be fitted, or [`IdentifyError::Interrupted`].
+/// If the model with the families cannot be fitted, or `INTERRUPTED`.
 pub(super) fn add(
     model: &mut PoseModel,
     options: &TraceOptions,
     spectra: bool,
     most: usize,
     interrupt: Interrupt<'_>,
-) -> Result<bool, IdentifyError> {
+) -> Result<bool, Diagnostic> {
     let most = most.saturating_sub(model.effects.len());
     let groups = groups(model, options, spectra, most);
     model.proposed = model.proposed.max(groups.iter().map(|group| group.effects.len()).sum());
@@ -221,7 +221,7 @@ fn finish(
     (groups, names): (&[Group], &[String]),
     accepted: Vec<Accepted>,
     (chosen, scales): (Vec<usize>, Scales),
-) -> Result<(), IdentifyError> {
+) -> Result<(), Diagnostic> {
     let problem = &model.problem;
     // The held-out error after each group is that before the next one.
     let readings = equations.readings();

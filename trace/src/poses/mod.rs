@@ -14,11 +14,12 @@ mod aliases;
 mod groups;
 mod single_effects;
 
-use abbe_identify::error::IdentifyError;
+use abbe_identify::error::{INTERRUPTED, NO_CONVERGENCE};
 use abbe_identify::fit::families::FoldEquations;
 use abbe_identify::fit::{Fit, NearMinimum, prepare_with, with_families_linearised};
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::effect::Effect;
 
@@ -98,7 +99,7 @@ impl PoseModel {
     ///
     /// # Errors
     /// If it cannot be fitted.
-    fn without(&self, declared: (&Problem, &Fit), removed: &[usize]) -> Result<PoseModel, IdentifyError> {
+    fn without(&self, declared: (&Problem, &Fit), removed: &[usize]) -> Result<PoseModel, Diagnostic> {
         let (mut problem, first) = (declared.0.clone(), declared.0.parameters.list.len());
         let mut effects = Vec::new();
         let mut beta = self.near.beta[..first].to_vec();
@@ -121,14 +122,14 @@ impl PoseModel {
 /// freedom: single effects alone are found by the search of the library.
 ///
 /// # Errors
-/// If a model cannot be fitted, or [`IdentifyError::Interrupted`] before a group was accepted.
+/// If a model cannot be fitted, or `INTERRUPTED` before a group was accepted.
 pub(super) fn search(
     problem: &Problem,
     fit: &Fit,
     options: &TraceOptions,
     policy: Policy,
     interrupt: Interrupt<'_>,
-) -> Result<Option<PoseSearch>, IdentifyError> {
+) -> Result<Option<PoseSearch>, Diagnostic> {
     // Without a degree of freedom nothing is left to explain, and the noise that families need has no estimate.
     if problem.scalars() <= fit.rank.identifiable_basis.ncols() {
         return Ok(None);
@@ -163,7 +164,7 @@ pub(super) fn search(
         });
         match PoseSearch::of(without, &library, ended, options.seed) {
             // A model that cannot be fitted takes no place of one that can.
-            Err(IdentifyError::NoConvergence { .. }) => {}
+            Err(error) if error.code == NO_CONVERGENCE => {}
             found => {
                 let single = found?;
                 // An interrupted repetition says nothing of what single effects could reach.
@@ -179,7 +180,7 @@ pub(super) fn search(
     }
     if !chosen.interrupted {
         match aliases::find(&mut chosen, &library, interrupt) {
-            Err(IdentifyError::Interrupted) => chosen.interrupted = true,
+            Err(error) if error.code == INTERRUPTED => chosen.interrupted = true,
             found => found?,
         }
     }
@@ -208,11 +209,11 @@ impl PoseSearch {
     fn of(
         model: PoseModel,
         library: &Library<'_>,
-        ended: Result<Ended, IdentifyError>,
+        ended: Result<Ended, Diagnostic>,
         seed: u64,
-    ) -> Result<PoseSearch, IdentifyError> {
+    ) -> Result<PoseSearch, Diagnostic> {
         let (ended, interrupted) = match ended {
-            Err(IdentifyError::Interrupted) => (Ended { detectable: 0, last_p_value: 1.0 }, true),
+            Err(error) if error.code == INTERRUPTED => (Ended { detectable: 0, last_p_value: 1.0 }, true),
             ended => (ended?, false),
         };
         let Ended { detectable, last_p_value } = ended;
@@ -268,7 +269,7 @@ fn complete(
     spectra: bool,
     limits: Limits,
     interrupt: Interrupt<'_>,
-) -> Result<Ended, IdentifyError> {
+) -> Result<Ended, Diagnostic> {
     loop {
         let before = model.effects.len();
         let ended = single_effects::add(model, library, limits, interrupt)?;
@@ -285,7 +286,7 @@ fn remove_needless(
     declared: (&Problem, &Fit),
     model: &mut PoseModel,
     interrupt: Interrupt<'_>,
-) -> Result<(), IdentifyError> {
+) -> Result<(), Diagnostic> {
     loop {
         interrupt.check()?;
         let (problem, list) = (&model.problem, &model.problem.parameters.list);

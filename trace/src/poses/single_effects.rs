@@ -6,11 +6,11 @@
 //! space by more than the standard error of the decrease. Of those that fit equally well the simplest is added. A
 //! harmonic of a joint about its own axis frees that order from the prior of its spectrum.
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::families::FoldEquations;
 use abbe_identify::fit::{Fit, with_families_linearised};
 use abbe_identify::numerics::tails::ln_chi_square_tail;
 use abbe_identify::problem::Problem;
+use abbe_model::Diagnostic;
 use abbe_model::driver::Driver;
 
 use super::{AcceptedEffect, PoseModel};
@@ -45,7 +45,7 @@ impl<'c> Library<'c> {
         columns: &'c Columns<'c>,
         fit: &Fit,
         options: &TraceOptions,
-    ) -> Result<Library<'c>, IdentifyError> {
+    ) -> Result<Library<'c>, Diagnostic> {
         let start = Start::of(problem, columns, fit)?;
         let searched = screening::searched_candidates(problem, columns, options)?;
         let is_single = |candidate: &Candidate| !candidate.last_resort && !candidate.dictionary;
@@ -58,13 +58,13 @@ impl<'c> Library<'c> {
     /// The candidates with a gain in each of some residuals, the largest evidence first, without some effects.
     ///
     /// # Errors
-    /// If the gains cannot be computed, or [`IdentifyError::Interrupted`].
+    /// If the gains cannot be computed, or `INTERRUPTED`.
     pub fn nearest(
         &self,
         effects: &[AcceptedEffect],
         residuals: &[Vec<Vec<f64>>],
         interrupt: Interrupt<'_>,
-    ) -> Result<Vec<Vec<&Candidate>>, IdentifyError> {
+    ) -> Result<Vec<Vec<&Candidate>>, Diagnostic> {
         let candidates = |scored: Scored| scored.best.into_iter().map(|k| &self.candidates[k]).collect();
         Ok(scored(self, effects, residuals, interrupt)?.into_iter().map(candidates).collect())
     }
@@ -99,13 +99,13 @@ pub(super) struct Limits {
 /// Adds single effects to a model until none lowers the held-out error, or a limit is reached.
 ///
 /// # Errors
-/// If a model cannot be fitted, or [`IdentifyError::Interrupted`]; `found` then holds the effects accepted so far.
+/// If a model cannot be fitted, or `INTERRUPTED`; `found` then holds the effects accepted so far.
 pub(super) fn add(
     found: &mut PoseModel,
     library: &Library<'_>,
     limits: Limits,
     interrupt: Interrupt<'_>,
-) -> Result<Ended, IdentifyError> {
+) -> Result<Ended, Diagnostic> {
     let mut ended = Ended { detectable: 0, last_p_value: 1.0 };
     let mut added = 0;
     while found.effects.len() < limits.effects {
@@ -158,7 +158,7 @@ struct Scored {
 }
 
 /// The candidates with the largest gains in the residual of a model.
-fn ranked(library: &Library<'_>, found: &PoseModel, interrupt: Interrupt<'_>) -> Result<Scored, IdentifyError> {
+fn ranked(library: &Library<'_>, found: &PoseModel, interrupt: Interrupt<'_>) -> Result<Scored, Diagnostic> {
     let residuals = std::slice::from_ref(&found.near.residuals);
     let mut of_residuals = scored(library, &found.effects, residuals, interrupt)?;
     let Scored { best, detectable } = of_residuals.pop().unwrap_or_default();
@@ -180,7 +180,7 @@ fn scored(
     effects: &[AcceptedEffect],
     residuals: &[Vec<Vec<f64>>],
     interrupt: Interrupt<'_>,
-) -> Result<Vec<Scored>, IdentifyError> {
+) -> Result<Vec<Scored>, Diagnostic> {
     let Library { columns, gram, candidates, .. } = library;
     let whitened: Vec<Vec<f64>> = residuals.iter().map(|residuals| columns.whitened_values(residuals)).collect();
     let should_continue = || interrupt.check().is_ok();
@@ -223,7 +223,7 @@ fn best_of<'c>(
     candidates: usize,
     significance: f64,
     interrupt: Interrupt<'_>,
-) -> Result<(Option<Lowering<'c>>, f64), IdentifyError> {
+) -> Result<(Option<Lowering<'c>>, f64), Diagnostic> {
     let mut all = found.problem.clone();
     let present = all.parameters.list.len();
     let mut own = Vec::new();

@@ -1,13 +1,13 @@
 //! The one builder of the result of a trace: for the search of the library, for the search on poses that accepts families,
 //! and for a trace that ended before its search.
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::outcome::goodness;
 use abbe_identify::fit::{self, Fit, JudgedBy};
 use abbe_identify::heldout::mislabelled_runs;
 use abbe_identify::plausibility::{self, Plausibility};
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{EffectResult, ModelResult, RejectedCandidate, Remainder, TraceResult, TraceVerdict};
+use abbe_model::Diagnostic;
 
 use super::changed_parameters;
 use super::verdict::not_examined;
@@ -30,7 +30,7 @@ impl<'m> Model<'m> {
         fit: &'m Fit,
         structured: bool,
         judged_by: Option<JudgedBy<'_>>,
-    ) -> Result<Model<'m>, IdentifyError> {
+    ) -> Result<Model<'m>, Diagnostic> {
         let goodness = goodness(problem, fit).with_structure(structured);
         Ok(Model { problem, fit, figures: fit::model(problem, fit, goodness, judged_by)? })
     }
@@ -107,7 +107,7 @@ pub(super) fn build(
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub(crate) fn unsearched(problem: &Problem, fit: &Fit) -> Result<TraceResult, IdentifyError> {
+pub(crate) fn unsearched(problem: &Problem, fit: &Fit) -> Result<TraceResult, Diagnostic> {
     let remainder = not_examined();
     let statements = Statements {
         verdict: TraceVerdict::Incomplete,

@@ -1,12 +1,12 @@
 //! Results of a found effect: name, numbers of the shape, parameters, curve.
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::Fit;
 use abbe_identify::parameters::{Parameter, Role};
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{
     AliasResult, EffectName, EffectResult, Estimate, LargestOrder, PriorResult, ShapeParameter,
 };
+use abbe_model::Diagnostic;
 use abbe_model::chain::Machine;
 use abbe_model::effect::description::{explanations, meaning};
 use abbe_model::effect::{Effect, Shape};
@@ -65,7 +65,7 @@ pub(super) fn result(
     families: &[Family],
     held_out: &HeldOut<'_>,
     found: &Found<'_>,
-) -> Result<EffectResult, IdentifyError> {
+) -> Result<EffectResult, Diagnostic> {
     let (after, search) = (found.after, findings.search);
     let taken = search.selected()[found.selected];
     let candidate = &search.candidates[found.candidate];
@@ -131,7 +131,7 @@ pub(super) fn described(
     fit: &Fit,
     number: usize,
     parameters: &[Estimate],
-) -> Result<EffectResult, IdentifyError> {
+) -> Result<EffectResult, Diagnostic> {
     let (machine, effect) = (&problem.session.machine, &problem.parameters.effects[number]);
     let (curve_at_unit, curve_unit) = curve_units(problem, effect);
     let meaning = meaning(machine, effect);

@@ -8,7 +8,6 @@ mod prediction;
 mod rejected;
 mod verdict;
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::{self, Fit, JudgedBy, prepare_with};
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
@@ -72,7 +71,7 @@ pub(super) struct ReportedEffect {
 }
 
 /// The result, and for each effect its aliases and the best competing effects.
-pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, IdentifyError> {
+pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Diagnostic> {
     let TraceFindings { before, before_fit, search, .. } = findings;
     // On the readings that are not excluded after the search.
     let by_last = Some(JudgedBy { readings: findings.after, heldout_mm: None });
@@ -187,7 +186,7 @@ fn searched_families(search: &SearchState<'_>, families: &[library::Family]) -> 
 
 /// The precessions of rotary axes that the declared model contains, with the location errors that rest on their absence: a
 /// forward precession of order 2 reads as a constant tilt.
-fn presumed(search: &SearchState<'_>, before: &Problem) -> Result<Vec<String>, IdentifyError> {
+fn presumed(search: &SearchState<'_>, before: &Problem) -> Result<Vec<String>, Diagnostic> {
     let list = &before.parameters.list;
     let declared = search.model_of(&[], &search.selection.branches[ALL].folds)?;
     let mut found: Vec<(Vec<&str>, Vec<String>)> = Vec::new();
@@ -343,7 +342,7 @@ fn with_aliases(
     chosen: &[(usize, bool)],
     alias_effects: &[Vec<Effect>],
     kept: &[usize],
-) -> Result<(Problem, Fit), IdentifyError> {
+) -> Result<(Problem, Fit), Diagnostic> {
     let search = findings.search;
     let effects: Vec<Effect> = (kept.iter())
         .map(|k| Effect {

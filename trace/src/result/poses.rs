@@ -1,9 +1,9 @@
 //! Result of a search on independent poses that accepted families of effects.
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::fit::Fit;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::EffectResult;
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 
 use super::effect::{described, explained_by};
@@ -33,13 +33,13 @@ pub(crate) fn outcome_of_poses(
     before_fit: &Fit,
     found: PoseSearch,
     ended: PosesEnded,
-) -> Result<TraceOutcome, IdentifyError> {
+) -> Result<TraceOutcome, Diagnostic> {
     let PoseSearch { problem: after, fit: after_fit, effects: accepted, proposed, .. } = found;
     let [structure_before, structure_after] = ended.structures;
     let (verdict, remainder) = of_poses(true, ended.stopped_early, structure_after.as_ref(), found.last_p_value);
     let declared = before.parameters.effects.len();
     let with_effects = Model::of(&after, &after_fit, remainder.structured, None)?;
-    let effect = |(k, accepted): (usize, &AcceptedEffect)| -> Result<EffectResult, IdentifyError> {
+    let effect = |(k, accepted): (usize, &AcceptedEffect)| -> Result<EffectResult, Diagnostic> {
         let described = described(&after, &after_fit, declared + k, &with_effects.figures.parameters)?;
         Ok(EffectResult {
             family: accepted.group.to_string(),

@@ -5,10 +5,10 @@
 //! model, and both predict the tests that the others identify. Aliases whose sums of squares differ by less than the
 //! confounding margin keep their order.
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::heldout::{LeftOutTests, left_out_tests};
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 
 use super::TraceFindings;
@@ -60,7 +60,7 @@ pub(super) fn predictions(
     findings: &TraceFindings<'_>,
     k: usize,
     aliases: &mut Vec<Alias>,
-) -> Result<Predictions, IdentifyError> {
+) -> Result<Predictions, Diagnostic> {
     let none = Predictions::none(aliases);
     if aliases.is_empty() || findings.after.models.len() < 2 {
         return Ok(none);
@@ -100,7 +100,7 @@ fn predicted_mm(
     k: usize,
     alias: &Effect,
     found: &LeftOutTests,
-) -> Result<Option<f64>, IdentifyError> {
+) -> Result<Option<f64>, Diagnostic> {
     let (before, after) = (findings.before, findings.after);
     let mut problem = before.clone();
     problem.noise = after.noise.clone();

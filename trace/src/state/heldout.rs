@@ -10,8 +10,8 @@
 
 use std::sync::Arc;
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::numerics::parallel;
+use abbe_model::Diagnostic;
 use abbe_model::driver::Driver;
 use abbe_model::effect::Component;
 use faer::Mat;
@@ -154,7 +154,7 @@ pub struct RejectedByHeldOut {
 
 impl SearchState<'_> {
     /// The residuals of the selected effects.
-    fn residuals(&mut self) -> Result<HeldOutResiduals, IdentifyError> {
+    fn residuals(&mut self) -> Result<HeldOutResiduals, Diagnostic> {
         let branches = &self.selection.branches;
         let of_all = self.prediction_of(&branches[ALL].chosen(), &branches[ALL].folds)?;
         let by_fold = parallel::map(branches.len() - 1, &|fold| {
@@ -162,7 +162,7 @@ impl SearchState<'_> {
             let residuals = [&averaged.prediction, &of_all].map(|predicted| self.residuals_of_fold(fold, predicted));
             Ok((residuals, averaged))
         });
-        let by_fold: Vec<([Vec<f64>; 2], Averaged)> = by_fold.into_iter().collect::<Result<_, IdentifyError>>()?;
+        let by_fold: Vec<([Vec<f64>; 2], Averaged)> = by_fold.into_iter().collect::<Result<_, Diagnostic>>()?;
         let (by_fold, averaged): (Vec<[Vec<f64>; 2]>, Vec<Averaged>) = by_fold.into_iter().unzip();
         self.averaged = averaged;
         let mut next = vec![0; by_fold.len()];
@@ -177,7 +177,7 @@ impl SearchState<'_> {
     }
 
     /// The prediction of the model with some effects, trained on some folds.
-    fn prediction_of(&self, chosen: &[usize], folds: &[usize]) -> Result<Prediction, IdentifyError> {
+    fn prediction_of(&self, chosen: &[usize], folds: &[usize]) -> Result<Prediction, Diagnostic> {
         let trained = self.model_of(chosen, folds)?;
         let (of_model, of_chosen) = trained.coefficients();
         Ok(Prediction::of(of_model, self.with_counts(chosen), of_chosen))
@@ -189,7 +189,7 @@ impl SearchState<'_> {
     }
 
     /// The averaged prediction of a branch: the last one, if nothing has changed since.
-    fn averaged(&self, branch: usize) -> Result<Averaged, IdentifyError> {
+    fn averaged(&self, branch: usize) -> Result<Averaged, Diagnostic> {
         let own = &self.selection.branches[branch];
         let addable = (0..self.candidates.len()).filter(|candidate| self.may_be_added(*candidate, &own.folds)).count();
         let over = AveragedOver {
@@ -209,7 +209,7 @@ impl SearchState<'_> {
 
     /// The prediction of a branch. For each effect it is averaged over the candidates that explain about as much in its
     /// place beside the others; the changes by the averages add up.
-    fn averaged_prediction(&self, branch: &SearchBranch) -> Result<Prediction, IdentifyError> {
+    fn averaged_prediction(&self, branch: &SearchBranch) -> Result<Prediction, Diagnostic> {
         let chosen = branch.chosen();
         let mut averaged = Prediction::default();
         averaged.add(1.0 - chosen.len() as f64, &self.prediction_of(&chosen, &branch.folds)?);
@@ -238,7 +238,7 @@ impl SearchState<'_> {
         effect: usize,
         others: &[usize],
         without: &TrainedModel<'_>,
-    ) -> Result<Vec<Explanation>, IdentifyError> {
+    ) -> Result<Vec<Explanation>, Diagnostic> {
         let variance = self.variance(without);
         let explanation = |candidate: usize, Gain { gain, freedom }: &Gain| Explanation {
             candidate,
@@ -297,12 +297,12 @@ impl SearchState<'_> {
     }
 
     /// Sum of squares of held-out residuals over the noise variance.
-    pub fn held_out_now(&mut self) -> Result<f64, IdentifyError> {
+    pub fn held_out_now(&mut self) -> Result<f64, Diagnostic> {
         Ok(self.residuals()?.held_out.iter().map(|r| r * r).sum())
     }
 
     /// Records the held-out error for the present number of effects.
-    pub fn note_held_out(&mut self) -> Result<(), IdentifyError> {
+    pub fn note_held_out(&mut self) -> Result<(), Diagnostic> {
         let residuals = self.residuals()?;
         let held_out = residuals.held_out.iter().map(|r| r * r).sum();
         self.selection.residuals = Arc::new(residuals);

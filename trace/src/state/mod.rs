@@ -13,7 +13,7 @@ mod tuning;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use abbe_identify::error::IdentifyError;
+use abbe_model::Diagnostic;
 use abbe_model::driver::Driver;
 use abbe_model::effect::{Component, Effect};
 
@@ -107,7 +107,7 @@ impl<'s> SearchState<'s> {
         gram: Gram<'s>,
         unwhitened: UnwhitenedModel,
         policy: Policy,
-    ) -> Result<SearchState<'s>, IdentifyError> {
+    ) -> Result<SearchState<'s>, Diagnostic> {
         let none = Selection::none(columns.fold_rows.len());
         let number_ranges = Arc::new(pool::number_ranges(&candidates));
         let mut search = SearchState {

@@ -5,8 +5,8 @@
 //! The objective is the evidence less the description length. The score of one candidate lacks `ln n`: where scores are
 //! compared with the best of readings without structure, the null distribution accounts for the choice.
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::numerics::tails::{ln_chi_square_tail, most_evidence};
+use abbe_model::Diagnostic;
 
 use super::{ALL, SearchState};
 use crate::candidates::gain::{Gain, TrainedModel};
@@ -52,7 +52,7 @@ impl SearchState<'_> {
     }
 
     /// The score of a candidate beside others.
-    pub fn score_beside(&self, candidate: usize, others: &[usize], folds: &[usize]) -> Result<f64, IdentifyError> {
+    pub fn score_beside(&self, candidate: usize, others: &[usize], folds: &[usize]) -> Result<f64, Diagnostic> {
         let model = self.model_of(others, folds)?;
         Ok(self.score(candidate, &model.gain(candidate)?, self.variance(&model)))
     }
@@ -63,18 +63,18 @@ impl SearchState<'_> {
     }
 
     /// The objective of a group beside other effects.
-    pub fn objective(&self, group: &[usize], rest: &[usize], folds: &[usize]) -> Result<f64, IdentifyError> {
+    pub fn objective(&self, group: &[usize], rest: &[usize], folds: &[usize]) -> Result<f64, Diagnostic> {
         Ok(self.evidence_of(group, rest, folds)? - self.description_length(group))
     }
 
     /// The objective of the selected effects.
-    pub fn objective_of_selected(&self) -> Result<f64, IdentifyError> {
+    pub fn objective_of_selected(&self) -> Result<f64, Diagnostic> {
         let chosen = self.selection.branches[ALL].chosen();
         if chosen.is_empty() { Ok(0.0) } else { self.objective(&chosen, &[], &self.selection.branches[ALL].folds) }
     }
 
     /// The objective of some candidates and one more, which need not be in the base.
-    pub fn objective_with(&self, some: &[usize], one: usize, folds: &[usize]) -> Result<f64, IdentifyError> {
+    pub fn objective_with(&self, some: &[usize], one: usize, folds: &[usize]) -> Result<f64, Diagnostic> {
         let model = self.model_of(some, folds)?;
         let all: Vec<usize> = some.iter().copied().chain([one]).collect();
         let explained = model.explained() + model.gain(one)?.gain;
@@ -82,7 +82,7 @@ impl SearchState<'_> {
     }
 
     /// `−ln P` of the joint gain of a group beside other effects.
-    pub fn evidence_of(&self, group: &[usize], rest: &[usize], folds: &[usize]) -> Result<f64, IdentifyError> {
+    pub fn evidence_of(&self, group: &[usize], rest: &[usize], folds: &[usize]) -> Result<f64, Diagnostic> {
         let all: Vec<usize> = rest.iter().chain(group).copied().collect();
         self.evidence_of_gain(self.model_of(&all, folds)?.explained(), group, rest, folds)
     }
@@ -93,7 +93,7 @@ impl SearchState<'_> {
         group: &[usize],
         rest: &[usize],
         folds: &[usize],
-    ) -> Result<f64, IdentifyError> {
+    ) -> Result<f64, Diagnostic> {
         let without = self.model_of(rest, folds)?;
         let gain = Gain {
             gain: explained - without.explained(),
@@ -159,7 +159,7 @@ impl SearchState<'_> {
         base: &[usize],
         folds: &[usize],
         mut accepts: impl FnMut(usize) -> bool,
-    ) -> Result<Vec<usize>, IdentifyError> {
+    ) -> Result<Vec<usize>, Diagnostic> {
         let model = self.model_of(base, folds)?;
         let variance = self.variance(&model);
         let gains = self.gains(&model)?;
@@ -176,7 +176,7 @@ impl SearchState<'_> {
 
     /// The best candidate, its p-value with respect to the best scores of the null draws, and the score that these exceed
     /// with the probability of the significance level. `None` if no candidate can be added.
-    pub fn best_against_null(&self) -> Result<Option<(usize, f64, f64)>, IdentifyError> {
+    pub fn best_against_null(&self) -> Result<Option<(usize, f64, f64)>, Diagnostic> {
         let chosen = self.selection.branches[ALL].chosen();
         let model = self.model_without(None)?;
         let Some((best, score)) = self.best_of(&model, &self.gains(&model)?, &chosen) else {

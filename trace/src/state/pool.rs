@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::numerics::parallel;
+use abbe_model::Diagnostic;
 use abbe_model::driver::Driver;
 use abbe_model::effect::{Component, Effect, Shape};
 
@@ -28,7 +28,7 @@ pub(super) fn number_ranges(library: &[Candidate]) -> HashMap<String, Vec<[f64; 
 
 impl SearchState<'_> {
     /// Judges for each candidate whether it is detectable at its largest plausible size.
-    pub(super) fn judge_detectability(&mut self) -> Result<(), IdentifyError> {
+    pub(super) fn judge_detectability(&mut self) -> Result<(), Diagnostic> {
         let model = self.model_without(None)?;
         let detectable: Vec<bool> = parallel::map(self.candidates.len(), &|candidate| {
             let d = model.projected(candidate)?.d;
@@ -37,7 +37,7 @@ impl SearchState<'_> {
             Ok(plausible * largest.max(0.0).sqrt() >= MIN_PLAUSIBLE_SIGMA)
         })
         .into_iter()
-        .collect::<Result<_, IdentifyError>>()?;
+        .collect::<Result<_, Diagnostic>>()?;
         drop(model);
         self.detectable_effects = detectable.iter().filter(|detectable| **detectable).count();
         for (candidate, detectable) in self.candidates.iter_mut().zip(detectable) {
@@ -145,14 +145,14 @@ impl SearchState<'_> {
     ///
     /// # Errors
     /// If products are not finite.
-    pub fn step_tables(&self, model: &TrainedModel<'_>) -> Result<Vec<StepTable>, IdentifyError> {
+    pub fn step_tables(&self, model: &TrainedModel<'_>) -> Result<Vec<StepTable>, Diagnostic> {
         let variance = self.variance(model);
         let dictionaries: Vec<usize> = (0..self.candidates.len())
             .filter(|own| self.candidates[*own].dictionary && !self.candidates[*own].forbidden)
             .collect();
         let best = |k: usize| best_step_table(model, dictionaries[k], &self.candidates[dictionaries[k]], variance);
         let tables: Vec<Option<StepTable>> =
-            parallel::map(dictionaries.len(), &best).into_iter().collect::<Result<_, IdentifyError>>()?;
+            parallel::map(dictionaries.len(), &best).into_iter().collect::<Result<_, Diagnostic>>()?;
         Ok(tables.into_iter().flatten().collect())
     }
 

@@ -6,10 +6,10 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::numerics::golden_section::highest;
 use abbe_identify::numerics::parallel;
 use abbe_identify::numerics::tails::most_evidence;
+use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 
 use super::{ALL, SearchState};
@@ -57,7 +57,7 @@ fn best_first(groups: impl Iterator<Item = Vec<(usize, f64)>>, least: f64, most:
 impl SearchState<'_> {
     /// Adds to the candidates those near the best, with their shape numbers tuned beside some candidates on some folds,
     /// and the step tables near the best. Returns the gains of the candidates that were present before.
-    pub fn tune_near_best(&mut self, beside: &[usize], folds: &[usize]) -> Result<Vec<Gain>, IdentifyError> {
+    pub fn tune_near_best(&mut self, beside: &[usize], folds: &[usize]) -> Result<Vec<Gain>, Diagnostic> {
         let can_be_tuned = |candidate: &Arc<Candidate>| candidate.dictionary || !candidate.brackets().is_empty();
         if !self.candidates.iter().any(can_be_tuned) {
             return Ok(Vec::new());
@@ -72,7 +72,7 @@ impl SearchState<'_> {
         Ok(gains)
     }
 
-    fn tuned_near_best(&self, model: &TrainedModel<'_>, gains: &[Gain]) -> Result<Vec<Tuned>, IdentifyError> {
+    fn tuned_near_best(&self, model: &TrainedModel<'_>, gains: &[Gain]) -> Result<Vec<Tuned>, Diagnostic> {
         let variance = self.variance(model);
         let most = self.effort(&model.folds).tuned;
         let mut nearest: HashMap<String, Vec<(usize, f64)>> = HashMap::new();
@@ -108,7 +108,7 @@ impl SearchState<'_> {
         model: &TrainedModel<'_>,
         best: f64,
         most: usize,
-    ) -> Result<Vec<Tuned>, IdentifyError> {
+    ) -> Result<Vec<Tuned>, Diagnostic> {
         let variance = self.variance(model);
         let mut nearest = self.step_tables(model)?;
         nearest.retain(|table| table.evidence >= MIN_EVIDENCE_SHARE * best);
@@ -137,7 +137,7 @@ impl SearchState<'_> {
         tunable: usize,
         beside: &[usize],
         folds: &[usize],
-    ) -> Result<Option<usize>, IdentifyError> {
+    ) -> Result<Option<usize>, Diagnostic> {
         let model = self.model_of(beside, folds)?;
         let fresh = if !self.effect(tunable).shape.positions().is_empty() {
             let table = self.step_table_of(&model, &self.effect(tunable).id())?;
@@ -154,7 +154,7 @@ impl SearchState<'_> {
     }
 
     /// The best step table of the dictionary of an identifier for addition to a model.
-    fn step_table_of(&self, model: &TrainedModel<'_>, id: &str) -> Result<Option<StepTable>, IdentifyError> {
+    fn step_table_of(&self, model: &TrainedModel<'_>, id: &str) -> Result<Option<StepTable>, Diagnostic> {
         let has_positions = |candidate: &Arc<Candidate>| !candidate.effect.shape.positions().is_empty();
         let own = |candidate: &Arc<Candidate>| {
             candidate.dictionary && has_positions(candidate) && candidate.effect.id() == id
@@ -165,7 +165,7 @@ impl SearchState<'_> {
 
     /// Tunes what may stand in the place of each selected effect: on the grid of the library an alias can explain much less
     /// than with its own best numbers.
-    pub fn tune_aliases(&mut self) -> Result<(), IdentifyError> {
+    pub fn tune_aliases(&mut self) -> Result<(), Diagnostic> {
         let folds = self.selection.branches[ALL].folds.clone();
         for k in 0..self.selected().len() {
             let fresh = self.tuned_in_place_of(k)?;
@@ -174,7 +174,7 @@ impl SearchState<'_> {
         Ok(())
     }
 
-    fn tuned_in_place_of(&self, k: usize) -> Result<Vec<Tuned>, IdentifyError> {
+    fn tuned_in_place_of(&self, k: usize) -> Result<Vec<Tuned>, Diagnostic> {
         let model = self.model_without(Some(k))?;
         let least = MIN_SHARE_ON_GRID * model.gain(self.selected()[k].candidate)?.gain;
         let gains = self.gains(&model)?;

@@ -1,6 +1,6 @@
 //! The fit of a session's set-up with known errors of the machine.
 
-use abbe_identify::error::IdentifyError;
+use abbe_identify::error;
 use abbe_identify::fit::{Minimum, minimum};
 use abbe_identify::heldout::stated_rms_mm;
 use abbe_identify::model_file::IdentifiedModel;
@@ -11,6 +11,7 @@ use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::Estimate;
 use abbe_identify::results::validation::RmsResult;
+use abbe_model::Diagnostic;
 use abbe_model::component::ErrorName;
 use abbe_model::session::Prior;
 use abbe_model::session::Session;
@@ -85,7 +86,7 @@ impl<'m> KnownErrors<'m> {
         model: &'m IdentifiedModel,
         session: &Session,
         anew: &[ErrorName],
-    ) -> Result<KnownErrors<'m>, IdentifyError> {
+    ) -> Result<KnownErrors<'m>, Diagnostic> {
         let is_anew = |j: &usize| {
             let parameter = &model.parameters[*j];
             parameter.role == Role::Error && anew.iter().any(|name| name.to_string() == parameter.id)
@@ -98,7 +99,7 @@ impl<'m> KnownErrors<'m> {
                 carried.iter().map(|j| &model.parameters[*j]).filter(|parameter| parameter.role == Role::Error);
             let (what, these) = ("error to estimate anew", "its location errors are:");
             let known = errors.map(|parameter| &parameter.id);
-            return Err(IdentifyError::unknown("the model", what, name.to_string(), these, known));
+            return Err(error::unknown("the model", what, name.to_string(), these, known));
         }
         let (noise, noise_source) = first_noise(model, session)?;
         let mut full = Problem::new(&model.session(session), noise.clone(), 1)?;
@@ -130,7 +131,7 @@ impl<'m> KnownErrors<'m> {
         full.linearise_numbers(&mut beta)?;
         let depends = |test: usize| full.own_parameters(test).iter().any(|j| columns.contains(j));
         if columns.is_empty() || !(0..full.tests.len()).any(depends) {
-            return Err(IdentifyError::not_applicable(
+            return Err(error::not_applicable(
                 "no reading of the session depends on an error that the model holds",
                 "model and session have nothing in common",
                 "fit a model of the axes that the session moves",
@@ -188,7 +189,7 @@ impl<'m> KnownErrors<'m> {
     ///
     /// # Errors
     /// If the iterations do not converge.
-    pub fn fit(&self, values: &[f64]) -> Result<Vec<f64>, IdentifyError> {
+    pub fn fit(&self, values: &[f64]) -> Result<Vec<f64>, Diagnostic> {
         Ok(minimum(&self.problem(values), None)?.beta)
     }
 
@@ -196,7 +197,7 @@ impl<'m> KnownErrors<'m> {
     ///
     /// # Errors
     /// If the iterations do not converge.
-    pub fn settle(&mut self, values: &[f64]) -> Result<Vec<f64>, IdentifyError> {
+    pub fn settle(&mut self, values: &[f64]) -> Result<Vec<f64>, Diagnostic> {
         let mut problem = self.problem(values);
         let floor = problem.session.resolution_noise_mm();
         let mut beta = minimum(&problem, None)?.beta;
@@ -267,7 +268,7 @@ impl<'m> KnownErrors<'m> {
     ///
     /// # Errors
     /// If the iterations do not converge.
-    pub fn rms_with(&self, values: &[f64]) -> Result<Rms, IdentifyError> {
+    pub fn rms_with(&self, values: &[f64]) -> Result<Rms, Diagnostic> {
         Ok(self.rms(values, &self.fit(values)?).0)
     }
 
@@ -275,7 +276,7 @@ impl<'m> KnownErrors<'m> {
     ///
     /// # Errors
     /// If the iterations do not converge.
-    pub fn residuals_with(&self, values: &[f64]) -> Result<Vec<Vec<f64>>, IdentifyError> {
+    pub fn residuals_with(&self, values: &[f64]) -> Result<Vec<Vec<f64>>, Diagnostic> {
         Ok(self.rms(values, &self.fit(values)?).1)
     }
 
@@ -283,7 +284,7 @@ impl<'m> KnownErrors<'m> {
     ///
     /// # Errors
     /// If the model cannot be evaluated.
-    pub fn linearised(&self, values: &[f64], set_up: &[f64]) -> Result<Linearised, IdentifyError> {
+    pub fn linearised(&self, values: &[f64], set_up: &[f64]) -> Result<Linearised, Diagnostic> {
         let list = &self.full.parameters.list;
         let mut beta = vec![0.0; list.len()];
         self.columns.iter().zip(values).for_each(|(column, value)| beta[*column] = *value);
@@ -308,7 +309,7 @@ impl<'m> KnownErrors<'m> {
     }
 
     /// Number of identifiable directions of the set-up.
-    fn rank_of_set_up(&self, triangle: &Triangle, sizes: &[f64]) -> Result<usize, IdentifyError> {
+    fn rank_of_set_up(&self, triangle: &Triangle, sizes: &[f64]) -> Result<usize, Diagnostic> {
         let set_up: Vec<usize> = (0..sizes.len()).filter(|j| !self.columns.contains(j)).collect();
         let r = triangle.r();
         let scaled = faer::Mat::from_fn(r.nrows(), set_up.len(), |i, k| r[(i, set_up[k])] * sizes[set_up[k]]);
@@ -319,7 +320,7 @@ impl<'m> KnownErrors<'m> {
     ///
     /// # Errors
     /// If the model cannot be evaluated.
-    pub fn set_up_estimates(&self, values: &[f64]) -> Result<Vec<Estimate>, IdentifyError> {
+    pub fn set_up_estimates(&self, values: &[f64]) -> Result<Vec<Estimate>, Diagnostic> {
         let problem = self.problem(values);
         let Minimum { beta, triangles, rank } = minimum(&problem, None)?;
         let whole = problem.prior_triangle(&beta).merged(&triangles);
@@ -358,17 +359,17 @@ fn whitened_readings(problem: &Problem) -> usize {
 ///
 /// # Errors
 /// If neither has a noise of the unit of the readings.
-fn first_noise(model: &IdentifiedModel, session: &Session) -> Result<(Noise, NoiseSource), IdentifyError> {
+fn first_noise(model: &IdentifiedModel, session: &Session) -> Result<(Noise, NoiseSource), Diagnostic> {
     if let Some(sigma) = session.stated_noise_mm() {
         return Ok((Noise::white(sigma, NoiseSource::Stated), NoiseSource::Stated));
     }
     let unit = session.reading_unit();
     if model.unit != unit {
-        return Err(IdentifyError::Missing {
-            of: "the session".to_string(),
-            what: format!("noise, and that of the model is in {}", model.unit.symbol()),
-            remedy: format!("state `noise_{unit}` in [instrument]"),
-        });
+        return Err(error::missing(
+            "the session",
+            format!("noise, and that of the model is in {}", model.unit.symbol()),
+            format!("state `noise_{unit}` in [instrument]"),
+        ));
     }
     let noise = match model.noise.source {
         // A residual contains what the model lacks; on readings that it has not seen, that is the held-out error.

@@ -1,8 +1,7 @@
 //! Whether sessions and models are of one machine.
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::model_file::IdentifiedModel;
-use abbe_model::ModelError;
+use abbe_model::Diagnostic;
 use abbe_model::chain::Machine;
 use abbe_model::session::Session;
 
@@ -46,14 +45,14 @@ pub fn differences(own: &Machine, other: &Machine, places: [&str; 2]) -> Vec<Str
 ///
 /// # Errors
 /// If chain, axes, rotation convention or gravity differ, with what differs.
-pub(super) fn check(model: &IdentifiedModel, session: &Session) -> Result<Vec<String>, IdentifyError> {
+pub(super) fn check(model: &IdentifiedModel, session: &Session) -> Result<Vec<String>, Diagnostic> {
     let (own, other) = (&model.machine, session.machine.as_ref());
     let differences = differences(own, other, ["the model", "the session"]);
     if !differences.is_empty() {
-        return Err(IdentifyError::Model(ModelError::Session {
-            message: format!("the model is of another machine than the session: {}", differences.join("; ")),
-            help: "validate the model on a session of its machine, or fit a model of this one".into(),
-        }));
+        return Err(Diagnostic::session(
+            format!("the model is of another machine than the session: {}", differences.join("; ")),
+            "validate the model on a session of its machine, or fit a model of this one",
+        ));
     }
     let mut warnings = Vec::new();
     if own.name != other.name {

@@ -19,13 +19,13 @@ mod moved;
 mod prediction;
 mod verdict;
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::model_file::{IdentifiedModel, range};
 use abbe_identify::noise::ReadingNoise;
 use abbe_identify::parameters::Role;
 use abbe_identify::results::validation::{
     ModelNotJudged, MovedParameter, RmsResult, ValidatedModel, ValidationResult, WithoutResult,
 };
+use abbe_model::Diagnostic;
 use abbe_model::component::ErrorName;
 use abbe_model::session::Session;
 use known::KnownErrors;
@@ -57,7 +57,7 @@ pub struct Validation {
 /// # Errors
 /// If the session is of another machine or has no readings, no reading depends on the model, or the set-up cannot be
 /// estimated.
-pub fn validate(model: &IdentifiedModel, session: &Session) -> Result<Validation, IdentifyError> {
+pub fn validate(model: &IdentifiedModel, session: &Session) -> Result<Validation, Diagnostic> {
     validate_anew(model, session, &[])
 }
 
@@ -67,11 +67,7 @@ pub fn validate(model: &IdentifiedModel, session: &Session) -> Result<Validation
 ///
 /// # Errors
 /// As [`validate`], and if an error of `anew` is no parameter of the model.
-pub fn validate_anew(
-    model: &IdentifiedModel,
-    session: &Session,
-    anew: &[ErrorName],
-) -> Result<Validation, IdentifyError> {
+pub fn validate_anew(model: &IdentifiedModel, session: &Session, anew: &[ErrorName]) -> Result<Validation, Diagnostic> {
     let mut warnings = session.warnings.clone();
     warnings.extend(machine::check(model, session)?);
     // Where its own fit fails, the natural lever stays.
@@ -194,7 +190,7 @@ struct Judged {
 }
 
 impl Judged {
-    fn of(known: &KnownErrors<'_>, values: &[f64], beta: &[f64]) -> Result<Judged, IdentifyError> {
+    fn of(known: &KnownErrors<'_>, values: &[f64], beta: &[f64]) -> Result<Judged, Diagnostic> {
         let linearised = known.linearised(values, beta)?;
         Ok(Judged {
             prediction: Prediction::of(known, &linearised)?,

@@ -11,11 +11,11 @@
 //! by one, the most significant first, as long as the next one is significant at the level over all parameters
 //! (Bonferroni).
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::numerics::solve::solve_square;
 use abbe_identify::numerics::symmetric::pseudo_inverse;
 use abbe_identify::numerics::tails::normal_tail;
 use abbe_identify::results::validation::MovedParameter;
+use abbe_model::Diagnostic;
 use faer::Mat;
 
 use super::known::{KnownErrors, Linearised};
@@ -31,7 +31,7 @@ const LEAST_SHARE: f64 = 1e-6;
 ///
 /// # Errors
 /// If the factor has entries that are not finite.
-pub(super) fn moved(known: &KnownErrors<'_>, at: &Linearised) -> Result<Vec<MovedParameter>, IdentifyError> {
+pub(super) fn moved(known: &KnownErrors<'_>, at: &Linearised) -> Result<Vec<MovedParameter>, Diagnostic> {
     let (r, c, rest) = at.machine.parts();
     let count = c.len();
     // Parameters in units of their physical size: angles and lengths have entries of a similar magnitude.
@@ -99,7 +99,7 @@ impl Change {
 }
 
 /// The changes of the selected parameters, estimated together.
-fn changes_of(p: &Mat<f64>, y: &Mat<f64>, selected: &[usize]) -> Result<Vec<Change>, IdentifyError> {
+fn changes_of(p: &Mat<f64>, y: &Mat<f64>, selected: &[usize]) -> Result<Vec<Change>, Diagnostic> {
     let inverse = inverse_at(p, selected)?;
     let value = |k: usize| -> f64 { (0..selected.len()).map(|l| inverse[(k, l)] * y[(selected[l], 0)]).sum() };
     Ok((0..selected.len()).map(|k| Change { value: value(k), u: inverse[(k, k)].sqrt() }).collect())
@@ -116,7 +116,7 @@ fn best(
     y: &Mat<f64>,
     selected: &[usize],
     candidates: &[usize],
-) -> Result<Option<(usize, f64)>, IdentifyError> {
+) -> Result<Option<(usize, f64)>, Diagnostic> {
     let found = separate(p, y, selected, candidates)?.into_iter();
     Ok(found.max_by(|(_, a), (_, b)| a.abs().total_cmp(&b.abs())))
 }
@@ -127,7 +127,7 @@ fn separate(
     y: &Mat<f64>,
     selected: &[usize],
     candidates: &[usize],
-) -> Result<Vec<(usize, f64)>, IdentifyError> {
+) -> Result<Vec<(usize, f64)>, Diagnostic> {
     let inverse = inverse_at(p, selected)?;
     let found = candidates.iter().filter(|i| !selected.contains(i)).filter_map(|&i| {
         let shares = |k: usize| -> f64 { (0..selected.len()).map(|l| inverse[(k, l)] * p[(selected[l], i)]).sum() };
@@ -153,7 +153,7 @@ fn alternatives_of(chosen: usize, found: &[(usize, f64)]) -> Vec<usize> {
 }
 
 /// The inverse of `P` over the selected parameters, by way of a matrix with ones on its diagonal.
-fn inverse_at(p: &Mat<f64>, selected: &[usize]) -> Result<Mat<f64>, IdentifyError> {
+fn inverse_at(p: &Mat<f64>, selected: &[usize]) -> Result<Mat<f64>, Diagnostic> {
     let root = |i: usize| p[(selected[i], selected[i])].sqrt();
     let part = |i: usize, j: usize| 0.5 * (p[(selected[i], selected[j])] + p[(selected[j], selected[i])]);
     let count = selected.len();

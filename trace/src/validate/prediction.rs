@@ -9,7 +9,6 @@
 //!
 //! The interval `±1.96 s` covers the residual with a probability of 95 %.
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::noise::{NoiseSource, ShownNoise};
 use abbe_identify::numerics::parallel;
 use abbe_identify::numerics::solve::{Svd, solve_square};
@@ -17,6 +16,7 @@ use abbe_identify::numerics::symmetric::Symmetric;
 use abbe_identify::numerics::tails::{normal_quantile, residual_tail};
 use abbe_identify::numerics::tolerances::MIN_IDENTIFIABLE;
 use abbe_identify::results::validation::{JudgedResidual, RmsResult};
+use abbe_model::Diagnostic;
 use faer::Mat;
 
 use super::known::{KnownErrors, Linearised, Rms};
@@ -51,7 +51,7 @@ impl Prediction {
     ///
     /// # Errors
     /// If the model cannot be evaluated.
-    pub fn of(known: &KnownErrors<'_>, at: &Linearised) -> Result<Prediction, IdentifyError> {
+    pub fn of(known: &KnownErrors<'_>, at: &Linearised) -> Result<Prediction, Diagnostic> {
         let chi_square = chi_square(at);
         let freedom = at.freedom;
         let (predicted_mm, residuals) = predicted(known, at)?;
@@ -122,14 +122,14 @@ fn chi_square(at: &Linearised) -> f64 {
 ///
 /// # Errors
 /// If the factor has entries that are not finite.
-pub(super) fn undetermined(at: &Linearised) -> Result<usize, IdentifyError> {
+pub(super) fn undetermined(at: &Linearised) -> Result<usize, Diagnostic> {
     let signal = at.machine.r() * &at.null_directions;
     let values = Svd::of(signal.as_ref())?.singular_values;
     Ok(values.iter().filter(|value| **value >= MIN_IDENTIFIABLE).count())
 }
 
 /// Predicted standard deviations and residuals of all readings, by test, mm.
-fn predicted(known: &KnownErrors<'_>, at: &Linearised) -> Result<(Vec<Vec<f64>>, Vec<Vec<f64>>), IdentifyError> {
+fn predicted(known: &KnownErrors<'_>, at: &Linearised) -> Result<(Vec<Vec<f64>>, Vec<Vec<f64>>), Diagnostic> {
     let problem = &known.full;
     let sizes = problem.parameters.sizes();
     let set_up: Vec<usize> = (0..sizes.len()).filter(|j| !known.columns.contains(j)).collect();
@@ -157,7 +157,7 @@ fn predicted(known: &KnownErrors<'_>, at: &Linearised) -> Result<(Vec<Vec<f64>>,
             (noise + square(&of_model, i)).sqrt()
         });
         let residuals = (0..rows.nrows()).map(|i| rows[(i, rows.ncols() - 1)]);
-        Ok::<_, IdentifyError>((deviations.collect::<Vec<f64>>(), residuals.collect::<Vec<f64>>()))
+        Ok::<_, Diagnostic>((deviations.collect::<Vec<f64>>(), residuals.collect::<Vec<f64>>()))
     });
     let mut predicted = vec![Vec::new(); problem.models.len()];
     let mut residuals = predicted.clone();

@@ -1,6 +1,7 @@
 use std::path::Path;
 
 use abbe_files::ReadOptions;
+use abbe_identify::error;
 use abbe_identify::fit::prepare;
 use abbe_identify::model_file::Provenance;
 use abbe_identify::noise::NoiseSource;
@@ -81,7 +82,7 @@ fn a_session_that_the_model_does_not_affect_is_refused() {
     let mut second = session(&["A100"]);
     let model = model(&session(&["C100"]));
     second.tests.iter_mut().for_each(|test| test.readings = None);
-    assert!(matches!(validate(&model, &second), Err(IdentifyError::NoReadings)));
+    assert_eq!(validate(&model, &second).err(), Some(error::no_readings()));
     let mut empty = model.clone();
     empty.parameters.retain(|parameter| is_set_up(parameter.role));
     let error = validate(&empty, &session(&["A100"])).err().unwrap().to_string();

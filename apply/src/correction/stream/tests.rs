@@ -34,7 +34,7 @@ fn errors() -> EstimatedErrors {
 }
 
 /// The text that a file of commands gives.
-fn text(path: &Path, output: Output) -> Result<String, ApplyError> {
+fn text(path: &Path, output: Output) -> Result<String, Diagnostic> {
     let errors = errors();
     let machine = &errors.machine;
     let correction = Correction { machine, errors: &errors, tool_mm: [0.0; 3], aim: Aim::of(machine) };

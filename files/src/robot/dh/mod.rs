@@ -15,7 +15,7 @@ mod row;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::code::MAX_AXES;
-use abbe_model::error::{Location, ModelError};
+use abbe_model::diagnostic::{Diagnostic, Location};
 use abbe_model::instrument::Fault;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
@@ -85,17 +85,13 @@ pub struct Table {
 /// # Errors
 /// If a column is missing, stands twice or has the unit of something else; if a cell is no value, or the joint moves a
 /// parameter that no joint moves: with the line and what to do.
-pub fn read(source: &Source, convention: Convention) -> Result<Table, ModelError> {
+pub fn read(source: &Source, convention: Convention) -> Result<Table, Diagnostic> {
     let lines: Vec<(usize, &str)> = (source.text.lines().enumerate())
         .map(|(line, text)| (line + 1, text))
         .filter(|(_, text)| !text.trim().is_empty() && !is_comment(text))
         .collect();
     let at = |line: usize| {
-        move |(message, help): Fault| ModelError::Input {
-            location: Location::line(&source.file, line),
-            message,
-            help: Some(help),
-        }
+        move |(message, help): Fault| Diagnostic::input(Location::line(&source.file, line), message, help)
     };
     let Some(((header_line, header), rows)) = lines.split_first() else {
         return Err(at(1)(("an empty table".into(), NAMES.into())));

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
 
-use abbe_model::error::{Location, ModelError};
+use abbe_model::diagnostic::{Diagnostic, Location};
 use encoding_rs::Encoding;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
@@ -50,12 +50,8 @@ struct OpenElement {
 }
 
 /// The state of a file and its text.
-fn decoded(store: &Store, file: &Path, stated: Option<&'static Encoding>) -> Result<(FileStamp, String), ModelError> {
-    let fault = |message: String| ModelError::Input {
-        location: Location::file(file),
-        message,
-        help: Some("check `data` and the file".into()),
-    };
+fn decoded(store: &Store, file: &Path, stated: Option<&'static Encoding>) -> Result<(FileStamp, String), Diagnostic> {
+    let fault = |message: String| Diagnostic::input(Location::file(file), message, "check `data` and the file");
     let unreadable = |cause: std::io::Error| fault(format!("the data file cannot be read: {cause}"));
     let mut opened = store.open(file).map_err(unreadable)?;
     let stamp = FileStamp::of(file, opened.state().map_err(unreadable)?);
@@ -80,7 +76,7 @@ pub(super) fn parse(
     store: &Store,
     file: &Path,
     encoding: Option<&'static Encoding>,
-) -> Result<(FileStamp, Contents), ModelError> {
+) -> Result<(FileStamp, Contents), Diagnostic> {
     let (stamp, text) = decoded(store, file, encoding)?;
     let mut reader = Reader::from_str(&text);
     let mut contents = Contents::default();
@@ -90,12 +86,12 @@ pub(super) fn parse(
         let until = (reader.buffer_position() as usize).min(text.len());
         line += text.as_bytes()[counted..until].iter().filter(|byte| **byte == b'\n').count();
         counted = until;
-        let broken = |cause: String| ModelError::Input {
-            location: Location::line(file, line),
-            message: format!("not valid XML: {cause}"),
-            help: Some(
-                "a ball-bar file in XML is expected; other files need another name, such as .csv or .xlsx".into(),
-            ),
+        let broken = |cause: String| {
+            Diagnostic::input(
+                Location::line(file, line),
+                format!("not valid XML: {cause}"),
+                "a ball-bar file in XML is expected; other files need another name, such as .csv or .xlsx",
+            )
         };
         match reader.read_event() {
             Err(cause) => return Err(broken(cause.to_string())),
@@ -132,8 +128,8 @@ fn opened(
     start: &BytesStart<'_>,
     line: usize,
     contents: &mut Contents,
-    broken: &impl Fn(String) -> ModelError,
-) -> Result<OpenElement, ModelError> {
+    broken: &impl Fn(String) -> Diagnostic,
+) -> Result<OpenElement, Diagnostic> {
     let name = start.local_name().as_ref().to_string();
     let mut element =
         OpenElement { name, line, text: String::new(), direction: None, once: false, undirected_runs: Vec::new() };

@@ -12,7 +12,7 @@ mod direction;
 
 use std::path::Path;
 
-use abbe_model::error::{Location, ModelError};
+use abbe_model::diagnostic::{Diagnostic, Location};
 use abbe_model::instrument::column::Quantity;
 use abbe_model::session::motion::Motion;
 use abbe_model::session::readings::{Origin, Readings};
@@ -33,7 +33,7 @@ impl DataFormat for BallBarXml {
         has_extension(file, &["xml", "b5r"])
     }
 
-    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, ModelError> {
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, Diagnostic> {
         Ok(Content::Readings(Box::new(read(file, request)?)))
     }
 }
@@ -42,14 +42,12 @@ impl DataFormat for BallBarXml {
 ///
 /// # Errors
 /// If it is not XML, contains no readings, or lacks information for their use, with the line and what to do.
-fn read(file: &Path, request: &Request<'_>) -> Result<WholeReadings, ModelError> {
+fn read(file: &Path, request: &Request<'_>) -> Result<WholeReadings, Diagnostic> {
     let test = request.test;
     let role = value_role(file, request)?;
     let (stamp, contents) = contents::parse(request.store, file, request.format.encoding)?;
-    let fault = |line: usize, message: String, help: String| ModelError::Input {
-        location: if line == 0 { Location::file(file) } else { Location::line(file, line) },
-        message,
-        help: Some(help),
+    let fault = |line: usize, message: String, help: String| {
+        Diagnostic::input(if line == 0 { Location::file(file) } else { Location::line(file, line) }, message, help)
     };
     if contents.runs.is_empty() {
         let help = "only ball-bar files with runs of READINGS are read; export the readings as CSV and map its columns";
@@ -125,10 +123,10 @@ fn read(file: &Path, request: &Request<'_>) -> Result<WholeReadings, ModelError>
 }
 
 /// The column of ours that READINGS contains, as `[columns]` states.
-fn value_role(file: &Path, request: &Request<'_>) -> Result<Role, ModelError> {
+fn value_role(file: &Path, request: &Request<'_>) -> Result<Role, Diagnostic> {
     let help = "state their unit: `[columns]` with `deviation_um = \"READINGS\"` (from `bar_mm`), or `length_mm = \"READINGS\"`";
     let mapped = request.columns.unwrap_or(&[]);
-    let fault = |location: Location, message: String| ModelError::Input { location, message, help: Some(help.into()) };
+    let fault = |location: Location, message: String| Diagnostic::input(location, message, help);
     let Some(entry) = mapped.iter().find(|entry| entry.foreign == ForeignColumn::Name(READINGS.into())) else {
         return Err(fault(Location::file(file), "the file does not state the unit of its READINGS".into()));
     };

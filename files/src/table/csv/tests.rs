@@ -6,7 +6,7 @@ use super::super::request::Format;
 use super::*;
 use crate::store::Store;
 
-fn opened(file: &Path, format: &Format, limits: Limits) -> Result<CsvRows, ModelError> {
+fn opened(file: &Path, format: &Format, limits: Limits) -> Result<CsvRows, Diagnostic> {
     let lines = Lines::within(&Store::Disk, file, format, limits)?;
     Ok(CsvRows::new(lines, format.separator))
 }

@@ -7,13 +7,14 @@
 //!
 //! The right-hand side `(a, d)` then explains `‖L⁻¹a‖² + ‖M⁻¹(d − Zᵀ L⁻¹a)‖²`.
 
+use abbe_model::Diagnostic;
 use faer::linalg::solvers::Llt;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::prelude::Solve;
 use faer::{Mat, Par, Side};
 
 use super::{FoldEquations, PRESENT_VARIANCE};
-use crate::error::IdentifyError;
+use crate::error;
 use crate::numerics::parallel;
 use crate::problem::Problem;
 
@@ -45,7 +46,7 @@ impl FoldEquations {
     ///
     /// # Errors
     /// If the equations are not positive definite.
-    pub fn bordered(&self, shared: &[usize], folds: bool, problem: &Problem) -> Result<Bordered<'_>, IdentifyError> {
+    pub fn bordered(&self, shared: &[usize], folds: bool, problem: &Problem) -> Result<Bordered<'_>, Diagnostic> {
         self.bordered_at(shared, folds, PRESENT_VARIANCE, &self.precisions(problem))
     }
 
@@ -55,7 +56,7 @@ impl FoldEquations {
         folds: bool,
         variance: f64,
         precisions: &[f64],
-    ) -> Result<Bordered<'_>, IdentifyError> {
+    ) -> Result<Bordered<'_>, Diagnostic> {
         let others: Vec<usize> = (0..self.sizes.len()).filter(|j| shared.binary_search(j).is_err()).collect();
         let information = self.equations.information(variance, precisions);
         let right = self.equations.right_side(variance);
@@ -82,7 +83,7 @@ impl Bordered<'_> {
     ///
     /// # Errors
     /// If the equations are not positive definite.
-    pub fn explained(&self, others: &[usize]) -> Result<f64, IdentifyError> {
+    pub fn explained(&self, others: &[usize]) -> Result<f64, Diagnostic> {
         let places = self.places(others);
         let own = self.whole.right_of(&places);
         let solved = self.whole.border(&places)?.solve(&own);
@@ -94,7 +95,7 @@ impl Bordered<'_> {
     ///
     /// # Errors
     /// If the equations are not positive definite.
-    pub fn held_out(&self, others: &[usize]) -> Result<Vec<f64>, IdentifyError> {
+    pub fn held_out(&self, others: &[usize]) -> Result<Vec<f64>, Diagnostic> {
         let places = self.places(others);
         let of_folds = parallel::map(self.without_folds.len(), &|k| {
             let (of_shared, of_others) = self.without_folds[k].solution(&places)?;
@@ -112,17 +113,12 @@ impl Bordered<'_> {
 }
 
 impl Factored {
-    fn of(
-        information: &Mat<f64>,
-        right: &[f64],
-        shared: &[usize],
-        others: &[usize],
-    ) -> Result<Factored, IdentifyError> {
+    fn of(information: &Mat<f64>, right: &[f64], shared: &[usize], others: &[usize]) -> Result<Factored, Diagnostic> {
         let part = |rows: &[usize], columns: &[usize]| {
             Mat::from_fn(rows.len(), columns.len(), |i, j| information[(rows[i], columns[j])])
         };
         let right = |rows: &[usize]| Mat::from_fn(rows.len(), 1, |i, _| right[rows[i]]);
-        let factor = part(shared, shared).llt(Side::Lower).map_err(|_| IdentifyError::Decomposition)?;
+        let factor = part(shared, shared).llt(Side::Lower).map_err(|_| error::decomposition())?;
         let (mut z, mut along) = (part(shared, others), right(shared));
         solve_lower_triangular_in_place(factor.L(), z.as_mut(), Par::Seq);
         solve_lower_triangular_in_place(factor.L(), along.as_mut(), Par::Seq);
@@ -131,9 +127,9 @@ impl Factored {
         Ok(Factored { factor, z, along, rest, right })
     }
 
-    fn border(&self, places: &[usize]) -> Result<Llt<f64>, IdentifyError> {
+    fn border(&self, places: &[usize]) -> Result<Llt<f64>, Diagnostic> {
         let border = Mat::from_fn(places.len(), places.len(), |i, j| self.rest[(places[i], places[j])]);
-        border.llt(Side::Lower).map_err(|_| IdentifyError::Decomposition)
+        border.llt(Side::Lower).map_err(|_| error::decomposition())
     }
 
     fn right_of(&self, places: &[usize]) -> Mat<f64> {
@@ -141,7 +137,7 @@ impl Factored {
     }
 
     /// The shared parameters and the others at the minimum.
-    fn solution(&self, places: &[usize]) -> Result<(Mat<f64>, Mat<f64>), IdentifyError> {
+    fn solution(&self, places: &[usize]) -> Result<(Mat<f64>, Mat<f64>), Diagnostic> {
         let of_others = self.border(places)?.solve(&self.right_of(places));
         let mut of_shared = self.along.clone();
         for (place, value) in places.iter().zip(of_others.col_as_slice(0)) {

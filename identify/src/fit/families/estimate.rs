@@ -1,8 +1,9 @@
 //! Estimates scales, noise and inflation: scales and noise in turn for an inflation, and the inflation at which the
 //! held-out folds are covered.
 
+use abbe_model::Diagnostic;
+
 use super::{FIRST_INFLATION, FoldEquations, START_PRECISION, Scales};
-use crate::error::IdentifyError;
 use crate::problem::Problem;
 
 /// How exact an estimate is. The calibration of held-out folds changes by about a twentieth of what the inflation changes.
@@ -45,7 +46,7 @@ impl FoldEquations {
     ///
     /// # Errors
     /// If the equations are not positive definite.
-    pub fn estimate(&self) -> Result<Scales, IdentifyError> {
+    pub fn estimate(&self) -> Result<Scales, Diagnostic> {
         let precisions = vec![START_PRECISION; self.equations.families.len()];
         self.estimate_from(FIRST_INFLATION, Start { precisions, variance: 1.0 }, &OF_A_FIT)
     }
@@ -55,14 +56,14 @@ impl FoldEquations {
     ///
     /// # Errors
     /// See [`FoldEquations::estimate`].
-    pub fn estimate_near(&self, problem: &Problem, inflation: Option<f64>) -> Result<Scales, IdentifyError> {
+    pub fn estimate_near(&self, problem: &Problem, inflation: Option<f64>) -> Result<Scales, Diagnostic> {
         // An estimated inflation is part of the whitening.
         let variance = inflation.map_or(1.0, |inflation| 1.0 / inflation);
         let start = Start { precisions: self.precisions(problem), variance };
         self.estimate_from(inflation.unwrap_or(FIRST_INFLATION), start, &OF_A_SEARCH)
     }
 
-    fn estimate_from(&self, inflation: f64, start: Start, to: &Tolerances) -> Result<Scales, IdentifyError> {
+    fn estimate_from(&self, inflation: f64, start: Start, to: &Tolerances) -> Result<Scales, Diagnostic> {
         if self.equations.families.is_empty() {
             return self.at(1.0, start, to).map(|(scales, _)| scales);
         }
@@ -105,7 +106,7 @@ impl FoldEquations {
     }
 
     /// Scales and noise for an inflation, and the calibration of the held-out folds.
-    fn at(&self, inflation: f64, start: Start, to: &Tolerances) -> Result<(Scales, f64), IdentifyError> {
+    fn at(&self, inflation: f64, start: Start, to: &Tolerances) -> Result<(Scales, f64), Diagnostic> {
         let Start { mut precisions, mut variance } = start;
         let mut rounds = 0;
         let posterior = loop {

@@ -1,7 +1,7 @@
 //! `backlash`: lost motion on reversal. The basis function is −½ · direction, so the coefficient is the full lost
 //! motion.
 
-use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind};
+use super::kind::{Basis, Entry, Follows, ShapeKind};
 use super::words::EffectWords;
 use super::{DriverSample, KeyWriter, Shape};
 use crate::driver::DriverPart;
@@ -26,7 +26,7 @@ impl ShapeKind for Backlash {
         &ENTRY
     }
     fn write(&self, _: &mut KeyWriter) {}
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         Ok(())
     }
     fn describe(&self, words: &EffectWords) -> String {

@@ -1,6 +1,6 @@
 //! `constant`: a PIGE. The basis function is 1.
 
-use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind};
+use super::kind::{Basis, Entry, Follows, ShapeKind};
 use super::words::EffectWords;
 use super::{DriverSample, KeyWriter, Shape};
 use crate::scalar::Nominal;
@@ -22,7 +22,7 @@ impl ShapeKind for Constant {
         &ENTRY
     }
     fn write(&self, _: &mut KeyWriter) {}
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         Ok(())
     }
     fn describe(&self, words: &EffectWords) -> String {

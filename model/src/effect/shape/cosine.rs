@@ -3,7 +3,7 @@
 //! A tube that bends under its weight sags with the cosine of its elevation and with nothing else.
 
 use super::harmonic::ORDER;
-use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind, positive};
+use super::kind::{Basis, Entry, Follows, ShapeKind, positive};
 use super::words::EffectWords;
 use super::{DriverSample, KeyWriter, Shape};
 use crate::scalar::Nominal;
@@ -34,7 +34,7 @@ impl ShapeKind for Cosine {
     fn write(&self, keys: &mut KeyWriter) {
         keys.set("order", self.order);
     }
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         positive(self.order, "the order of a cosine")
     }
     fn describe(&self, words: &EffectWords) -> String {

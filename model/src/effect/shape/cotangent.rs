@@ -3,7 +3,7 @@
 //! Over the elevation it is the tangent of the zenith distance, which refraction follows, and a sag that grows towards
 //! the horizon. It has no value where the position is a multiple of 180°.
 
-use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind};
+use super::kind::{Basis, Entry, Follows, ShapeKind};
 use super::words::EffectWords;
 use super::{DriverSample, KeyWriter, Shape};
 use crate::effect::sampled::Sampled;
@@ -38,7 +38,7 @@ impl ShapeKind for Cotangent {
         &ENTRY
     }
     fn write(&self, _: &mut KeyWriter) {}
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         Ok(())
     }
     fn describe(&self, words: &EffectWords) -> String {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind, positive};
+use super::kind::{Basis, Entry, Follows, ShapeKind, positive};
 use super::words::EffectWords;
 use super::{DriverSample, Key, KeyForm, KeyReader, KeyWriter, Shape};
 use crate::document::Fault;
@@ -83,14 +83,14 @@ impl ShapeKind for Curve {
         keys.set("intervals", self.intervals);
         keys.set("closed", self.closed);
     }
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         positive(self.to - self.from, "the length of a curve")?;
         let least = if self.closed { 4 } else { 1 };
         if self.intervals < least || self.intervals > MAX_INTERVALS {
-            return Err(ShapeFault(format!(
+            return Err(format!(
                 "a curve has {} intervals; {least} to {MAX_INTERVALS} are allowed",
                 self.intervals
-            )));
+            ));
         }
         Ok(())
     }

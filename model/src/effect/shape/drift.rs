@@ -1,6 +1,6 @@
 //! `drift`: linear in time. The basis function is the time in hours.
 
-use super::kind::{Basis, Entry, Follows, Per, ShapeFault, ShapeKind};
+use super::kind::{Basis, Entry, Follows, Per, ShapeKind};
 use super::words::EffectWords;
 use super::{DriverSample, KeyWriter, Shape};
 use crate::driver::SECONDS_PER_HOUR;
@@ -23,7 +23,7 @@ impl ShapeKind for Drift {
         &ENTRY
     }
     fn write(&self, _: &mut KeyWriter) {}
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         Ok(())
     }
     fn describe(&self, words: &EffectWords) -> String {

@@ -3,7 +3,7 @@
 //! The driver's samples are those of y: see [`crate::driver::Reference`]. The coefficient is the final value of the
 //! component after a step of q by the scale s.
 
-use super::kind::{Basis, Entry, Follows, Per, ShapeFault, ShapeKind, positive};
+use super::kind::{Basis, Entry, Follows, Per, ShapeKind, positive};
 use super::words::{EffectWords, four_digits};
 use super::{DriverSample, KeyWriter, Shape, polynomial, warmup};
 use crate::scalar::Nominal;
@@ -42,7 +42,7 @@ impl ShapeKind for FirstOrderLag {
         keys.set("tau_s", self.tau_s);
         keys.quantity(&polynomial::SCALE, self.scale);
     }
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         positive(self.tau_s, "the time constant of a first-order lag")?;
         positive(self.scale, "the scale of a first-order lag")
     }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
-use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind, positive};
+use super::kind::{Basis, Entry, Follows, ShapeKind, positive};
 use super::words::EffectWords;
 use super::{DriverSample, Key, KeyForm, KeyWriter, Shape};
 use crate::effect::sampled::{READINGS_PER_CYCLE, Sampled};
@@ -82,7 +82,7 @@ impl ShapeKind for Harmonic {
     fn write(&self, keys: &mut KeyWriter) {
         keys.set("order", self.order);
     }
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         positive(self.order, "the order of a harmonic")
     }
     fn describe(&self, words: &EffectWords) -> String {

@@ -9,11 +9,6 @@ use crate::effect::shape::Shape;
 use crate::effect::shape::words::EffectWords;
 use crate::scalar::Nominal;
 
-/// Invalid shape parameters.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct ShapeFault(pub String);
-
 /// A shape in the registry: what is known of it without its numbers.
 pub struct Entry {
     /// The word in files.
@@ -103,7 +98,7 @@ pub trait ShapeKind {
     ///
     /// # Errors
     /// The message names the invalid number and the requirement.
-    fn check(&self) -> Result<(), ShapeFault>;
+    fn check(&self) -> Result<(), String>;
     /// The motion of a component and its dependence on the driver, in words.
     fn describe(&self, words: &EffectWords) -> String;
 
@@ -218,10 +213,10 @@ pub trait Basis {
 }
 
 /// Checks that a number is positive; `what` is its name in the message.
-pub(super) fn positive(value: f64, what: &str) -> Result<(), ShapeFault> {
+pub(super) fn positive(value: f64, what: &str) -> Result<(), String> {
     if value.is_finite() && value > 0.0 {
         Ok(())
     } else {
-        Err(ShapeFault(format!("{what} is {}; it must be a positive number", crate::words::number(value))))
+        Err(format!("{what} is {}; it must be a positive number", crate::words::number(value)))
     }
 }

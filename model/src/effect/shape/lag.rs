@@ -1,7 +1,7 @@
 //! `lag`: the component trails in proportion to the rate of the driver. The basis function is −rate, so the coefficient
 //! is the delay in s.
 
-use super::kind::{Basis, Entry, Follows, Per, ShapeFault, ShapeKind};
+use super::kind::{Basis, Entry, Follows, Per, ShapeKind};
 use super::words::EffectWords;
 use super::{DriverSample, KeyWriter, Shape};
 use crate::driver::DriverPart;
@@ -26,7 +26,7 @@ impl ShapeKind for Lag {
         &ENTRY
     }
     fn write(&self, _: &mut KeyWriter) {}
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         Ok(())
     }
     fn describe(&self, words: &EffectWords) -> String {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind, positive};
+use super::kind::{Basis, Entry, Follows, ShapeKind, positive};
 use super::words::EffectWords;
 use super::{DriverSample, Key, KeyForm, KeyWriter, Shape};
 use crate::effect::sampled::Sampled;
@@ -72,9 +72,9 @@ impl ShapeKind for Local {
             keys.set("recurs", false);
         }
     }
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         if !self.centre.is_finite() {
-            return Err(ShapeFault(format!("a local feature at {}", self.centre)));
+            return Err(format!("a local feature at {}", self.centre));
         }
         positive(self.width, "the width of a local feature")
     }

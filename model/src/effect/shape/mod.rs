@@ -7,7 +7,7 @@
 mod kind;
 mod words;
 
-pub use kind::{Basis, Entry, Follows, Per, ShapeFault, ShapeKind};
+pub use kind::{Basis, Entry, Follows, Per, ShapeKind};
 pub use words::EffectWords;
 
 use std::ops::Deref;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind, positive};
+use super::kind::{Basis, Entry, Follows, ShapeKind, positive};
 use super::words::EffectWords;
 use super::{DriverSample, Key, KeyForm, KeyWriter, Shape};
 use crate::effect::sampled::{READINGS_PER_CYCLE, Sampled};
@@ -67,7 +67,7 @@ impl ShapeKind for Periodic {
     fn write(&self, keys: &mut KeyWriter) {
         keys.quantity(&PERIOD, self.period);
     }
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         positive(self.period, "a period")
     }
     fn describe(&self, words: &EffectWords) -> String {

@@ -1,6 +1,6 @@
 //! `polynomial`: the powers 1 to n of the driver over a scale: (q/s), …, (q/s)ⁿ.
 
-use super::kind::{Basis, Entry, Follows, Per, ShapeFault, ShapeKind, positive};
+use super::kind::{Basis, Entry, Follows, Per, ShapeKind, positive};
 use super::words::EffectWords;
 use super::{DriverSample, Key, KeyForm, KeyReader, KeyWriter, Shape};
 use crate::document::Fault;
@@ -48,12 +48,12 @@ pub(super) fn write(degree: usize, scale: f64, keys: &mut KeyWriter) {
 }
 
 /// Checks degree and scale.
-pub(super) fn check(degree: usize, scale: f64) -> Result<(), ShapeFault> {
+pub(super) fn check(degree: usize, scale: f64) -> Result<(), String> {
     positive(degree as f64, "the degree of a polynomial")?;
     if degree > HIGHEST_DEGREE {
-        return Err(ShapeFault(format!(
+        return Err(format!(
             "a polynomial of degree {degree} cannot be fitted; the limit is {HIGHEST_DEGREE}"
-        )));
+        ));
     }
     positive(scale, "the scale of a polynomial")
 }
@@ -74,7 +74,7 @@ impl ShapeKind for Polynomial {
     fn write(&self, keys: &mut KeyWriter) {
         write(self.degree, self.scale, keys);
     }
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         check(self.degree, self.scale)
     }
     fn describe(&self, words: &EffectWords) -> String {

@@ -1,6 +1,6 @@
 //! `power`: one power of the driver over a scale: (q/s)ⁿ. Results call it a polynomial.
 
-use super::kind::{Basis, Entry, Follows, Per, ShapeFault, ShapeKind};
+use super::kind::{Basis, Entry, Follows, Per, ShapeKind};
 use super::words::EffectWords;
 use super::{DriverSample, KeyWriter, Shape, polynomial};
 use crate::scalar::Nominal;
@@ -42,7 +42,7 @@ impl ShapeKind for Power {
     fn write(&self, keys: &mut KeyWriter) {
         polynomial::write(self.degree, self.scale, keys);
     }
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         polynomial::check(self.degree, self.scale)
     }
     fn describe(&self, words: &EffectWords) -> String {

@@ -15,7 +15,7 @@
 //! Diagnostics*, 2002). ISO 230-7 calls the errors tilt and radial error motion.
 
 use super::harmonic::{Harmonic, ORDER, times};
-use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind, positive};
+use super::kind::{Basis, Entry, Follows, ShapeKind, positive};
 use super::words::EffectWords;
 use super::{DriverSample, Key, KeyForm, KeyWriter, Shape};
 use crate::effect::sampled::Sampled;
@@ -75,7 +75,7 @@ impl ShapeKind for Precession {
             keys.set("backward", true);
         }
     }
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         positive(self.order, "the order of a precession")
     }
     fn describe(&self, words: &EffectWords) -> String {

@@ -1,6 +1,6 @@
 //! `reversal-spike`: a peak after each reversal: direction · exp(−distance since reversal / width).
 
-use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind, positive};
+use super::kind::{Basis, Entry, Follows, ShapeKind, positive};
 use super::words::EffectWords;
 use super::{DriverSample, Key, KeyForm, KeyWriter, Shape};
 use crate::driver::DriverPart;
@@ -44,7 +44,7 @@ impl ShapeKind for ReversalSpike {
     fn write(&self, keys: &mut KeyWriter) {
         keys.quantity(&WIDTH, self.width);
     }
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         positive(self.width, "the width of a reversal spike")
     }
     fn describe(&self, words: &EffectWords) -> String {

@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use super::kind::{Basis, Entry, Follows, Per, ShapeFault, ShapeKind, positive};
+use super::kind::{Basis, Entry, Follows, Per, ShapeKind, positive};
 use super::words::EffectWords;
 use super::{DriverSample, Key, KeyForm, KeyReader, KeyWriter, Shape};
 use crate::document::Fault;
@@ -64,10 +64,10 @@ impl ShapeKind for Spectrum {
             keys.quantity(&super::periodic::PERIOD, self.period);
         }
     }
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         positive(self.period, "a period")?;
         if self.orders == 0 || self.orders > HIGHEST_ORDER {
-            return Err(ShapeFault(format!("a spectrum has {} orders; 1 to {HIGHEST_ORDER} are allowed", self.orders)));
+            return Err(format!("a spectrum has {} orders; 1 to {HIGHEST_ORDER} are allowed", self.orders));
         }
         Ok(())
     }

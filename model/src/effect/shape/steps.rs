@@ -1,6 +1,6 @@
 //! `steps`: one at and beyond each position, 0 below: a compensation table, a pitch correction.
 
-use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind};
+use super::kind::{Basis, Entry, Follows, ShapeKind};
 use super::words::EffectWords;
 use super::{DriverSample, Key, KeyForm, KeyWriter, Shape};
 use crate::effect::sampled::Sampled;
@@ -50,12 +50,12 @@ impl ShapeKind for Steps {
     fn write(&self, keys: &mut KeyWriter) {
         keys.quantities(&AT, &self.at);
     }
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         if self.at.is_empty() {
-            return Err(ShapeFault("steps without a position".into()));
+            return Err("steps without a position".into());
         }
         match self.at.iter().find(|position| !position.is_finite()) {
-            Some(position) => Err(ShapeFault(format!("a step at {position}"))),
+            Some(position) => Err(format!("a step at {position}")),
             None => Ok(()),
         }
     }

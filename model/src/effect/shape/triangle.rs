@@ -4,7 +4,7 @@
 //! The coefficients are those of a cosine-like wave, with its peak at 0, and of a sine-like wave, with its peak at a
 //! quarter of a period. One of them alone is a triangle. Both together have kinks at every quarter of the period.
 
-use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind, positive};
+use super::kind::{Basis, Entry, Follows, ShapeKind, positive};
 use super::periodic::{self, PERIOD};
 use super::words::EffectWords;
 use super::{DriverSample, KeyWriter, Shape};
@@ -33,7 +33,7 @@ impl ShapeKind for Triangle {
     fn write(&self, keys: &mut KeyWriter) {
         keys.quantity(&PERIOD, self.period);
     }
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         positive(self.period, "a period")
     }
     fn describe(&self, words: &EffectWords) -> String {

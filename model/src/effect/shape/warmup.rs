@@ -1,6 +1,6 @@
 //! `warmup`: exponential approach in time: 1 − exp(−t/τ). The coefficient is the final value.
 
-use super::kind::{Basis, Entry, Follows, ShapeFault, ShapeKind, positive};
+use super::kind::{Basis, Entry, Follows, ShapeKind, positive};
 use super::words::{EffectWords, four_digits};
 use super::{DriverSample, Key, KeyForm, KeyWriter, Shape};
 use crate::scalar::Nominal;
@@ -39,7 +39,7 @@ impl ShapeKind for Warmup {
     fn write(&self, keys: &mut KeyWriter) {
         keys.set("tau_s", self.tau_s);
     }
-    fn check(&self) -> Result<(), ShapeFault> {
+    fn check(&self) -> Result<(), String> {
         positive(self.tau_s, "the time constant of a warm-up")
     }
     fn describe(&self, words: &EffectWords) -> String {

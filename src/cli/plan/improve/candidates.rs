@@ -1,9 +1,9 @@
 //! The candidate tests of `abbe plan --improve`.
 
+use abbe::model::Diagnostic;
 use abbe::plan::test_variations::TestVariations;
 use clap::Args;
 
-use crate::cli::failure::Failure;
 use crate::cli::values::{self, Words};
 
 /// The share of a range that is tried beside the whole range if gain per minute is compared.
@@ -71,7 +71,7 @@ pub struct CandidateArguments {
 
 impl CandidateArguments {
     /// Travel of the sensor in the bar, in each direction, mm.
-    pub fn reach_mm(&self) -> Result<f64, Failure> {
+    pub fn reach_mm(&self) -> Result<f64, Diagnostic> {
         values::DISTANCE_MM.check("--reach-mm", self.reach_mm)
     }
 
@@ -81,7 +81,7 @@ impl CandidateArguments {
     }
 
     /// The candidate tests.
-    pub fn tests(&self) -> Result<TestVariations, Failure> {
+    pub fn tests(&self) -> Result<TestVariations, Diagnostic> {
         let mut candidates = TestVariations { reach_mm: self.reach_mm()?, ..TestVariations::default() };
         if let Some(bars) = &self.bars_mm {
             candidates.bars_mm = values::LENGTH_MM.all("--bars-mm", bars)?;

@@ -1,10 +1,10 @@
 //! Poses of the UR10 whose columns are misread.
 
 use abbe::identify::results::TraceVerdict;
+use abbe::model::Diagnostic;
 use std::sync::Arc;
 
 use abbe::files::{self, ReadOptions};
-use abbe::identify::IdentifyError;
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::plausibility::{ConflictKind, SuggestionKind};
 use abbe::identify::results::FitResult;
@@ -35,7 +35,7 @@ fn ur10(test: &str, change: impl Fn(String) -> String) -> Option<Session> {
     Some(files::session(&at("session.toml"), &ReadOptions::default()).unwrap())
 }
 
-fn fitted(session: &Session) -> Result<FitResult, IdentifyError> {
+fn fitted(session: &Session) -> Result<FitResult, Diagnostic> {
     prepare(session, 1).map(|(problem, fit)| report(&problem, &fit).unwrap())
 }
 

@@ -12,7 +12,6 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock};
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::numerics::parallel;
 use abbe_identify::problem::{Problem, RowBlock};
 use abbe_model::driver::DriverSample;
@@ -165,7 +164,7 @@ impl<'p> Columns<'p> {
     ///
     /// # Errors
     /// If the model cannot be evaluated.
-    pub fn model_rows(&self, beta: &[f64]) -> Result<Mat<f64>, IdentifyError> {
+    pub fn model_rows(&self, beta: &[f64]) -> Result<Mat<f64>, Diagnostic> {
         let values = self.problem.slot_values(beta);
         let mut rows = Mat::zeros(self.rows, beta.len() + 1);
         let mut start = 0;

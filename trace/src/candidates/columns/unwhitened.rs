@@ -1,8 +1,8 @@
 //! Unwhitened rows of the readings that are not rejected as outliers, block after block.
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::heldout::FoldKind;
 use abbe_identify::problem::RowBlock;
+use abbe_model::Diagnostic;
 use faer::Mat;
 
 use super::{Columns, EffectColumns};
@@ -34,7 +34,7 @@ impl Columns<'_> {
         &self,
         beta: &[f64],
         to_parameters: &Mat<f64>,
-    ) -> Result<(Mat<f64>, Vec<f64>), IdentifyError> {
+    ) -> Result<(Mat<f64>, Vec<f64>), Diagnostic> {
         let values = self.problem.slot_values(beta);
         let rows = self.blocks.iter().map(|block| self.counting(block).len()).sum();
         let (mut model, mut residual) = (Mat::zeros(rows, to_parameters.ncols()), Vec::with_capacity(rows));

@@ -24,8 +24,9 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use abbe_identify::error::IdentifyError;
+use abbe_identify::error;
 use abbe_identify::numerics::parallel;
+use abbe_model::Diagnostic;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use layout::Layout;
@@ -168,13 +169,13 @@ impl<'c> Gram<'c> {
     /// first of these candidates. `None`: no candidates are added.
     ///
     /// # Errors
-    /// If products are not finite, or [`IdentifyError::Interrupted`] if `should_continue` returns `false`.
+    /// If products are not finite, or `INTERRUPTED` if `should_continue` returns `false`.
     pub fn take_draws(
         &mut self,
         source: &'c (dyn DrawSource + 'c),
         kept_entries: Option<usize>,
         should_continue: &(dyn Fn() -> bool + Sync),
-    ) -> Result<(), IdentifyError> {
+    ) -> Result<(), Diagnostic> {
         let whole = self.projection(&self.all_folds())?;
         let (draws, layout) = (source.draws(), Arc::clone(&self.segments[0].layout));
         self.draws = draws.len();
@@ -185,11 +186,11 @@ impl<'c> Gram<'c> {
         if kept || layout.total() > 0 {
             self.in_parts(&whole, draws, |first, side| {
                 if !should_continue() {
-                    return Err(IdentifyError::Interrupted);
+                    return Err(error::interrupted());
                 }
                 let places = places.get_or_insert_with(|| layout.places(&whole.training, &side.rows, self.draws));
                 let formed = layout.products_at(places, &whole.training, &side, false, should_continue);
-                let formed = formed.ok_or(IdentifyError::Interrupted)?.side;
+                let formed = formed.ok_or_else(error::interrupted)?.side;
                 products.as_mut().subrows_mut(first, formed.nrows()).copy_from(&formed);
                 if kept {
                     null.push(side);
@@ -208,8 +209,8 @@ impl<'c> Gram<'c> {
         &self,
         whole: &Projection,
         mut draws: Box<dyn ExactSizeIterator<Item = Vec<f64>> + Send + '_>,
-        mut each: impl FnMut(usize, Adjoint<f32>) -> Result<(), IdentifyError> + Send,
-    ) -> Result<(), IdentifyError> {
+        mut each: impl FnMut(usize, Adjoint<f32>) -> Result<(), Diagnostic> + Send,
+    ) -> Result<(), Diagnostic> {
         // Whole parts: a column of fewer draws is padded to a multiple of 64 bytes.
         let at_once = DRAWS_AT_ONCE * (MAX_NULL_ENTRIES / (DRAWS_AT_ONCE * self.residual.len().max(1))).max(1);
         let mut rows = None;
@@ -227,7 +228,7 @@ impl<'c> Gram<'c> {
     }
 
     /// The null draws, for a segment that was added later.
-    fn null(&self) -> Result<Arc<NullDraws>, IdentifyError> {
+    fn null(&self) -> Result<Arc<NullDraws>, Diagnostic> {
         let known = || self.null.lock().ok().and_then(|null| null.clone());
         if let Some(null) = known() {
             return Ok(null);
@@ -269,12 +270,12 @@ impl<'c> Gram<'c> {
     /// The products of the library over all rows with each of some other residuals.
     ///
     /// # Errors
-    /// If products are not finite, or [`IdentifyError::Interrupted`] if `should_continue` returns `false`.
+    /// If products are not finite, or `INTERRUPTED` if `should_continue` returns `false`.
     pub fn with_residuals(
         &self,
         residuals: &[Vec<f64>],
         should_continue: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Vec<Gram<'c>>, IdentifyError> {
+    ) -> Result<Vec<Gram<'c>>, Diagnostic> {
         let known = self.projection(&self.all_folds())?.products(self, 0, should_continue)?;
         let other = |residual: &Vec<f64>| Gram {
             residual: Arc::new(residual.clone()),
@@ -283,7 +284,7 @@ impl<'c> Gram<'c> {
         };
         let others: Vec<Gram<'c>> = residuals.iter().map(other).collect();
         let whole = |other| Ok((other, Gram::projection(other, &other.all_folds())?));
-        let projections = others.iter().map(whole).collect::<Result<Vec<_>, IdentifyError>>()?;
+        let projections = others.iter().map(whole).collect::<Result<Vec<_>, Diagnostic>>()?;
         Projection::take_products(&projections, 0, &known, should_continue)?;
         drop(projections);
         Ok(others)
@@ -349,7 +350,7 @@ impl<'c> Gram<'c> {
     }
 
     /// The projection for some training folds.
-    pub(super) fn projection(&self, folds: &[usize]) -> Result<Arc<Projection>, IdentifyError> {
+    pub(super) fn projection(&self, folds: &[usize]) -> Result<Arc<Projection>, Diagnostic> {
         stored(&self.projections, &folds.to_vec(), || Ok(Arc::new(Projection::of(self, folds)?)))
     }
 
@@ -369,12 +370,8 @@ impl<'c> Gram<'c> {
     /// Forms the products of the library for several sets of training folds at the same time.
     ///
     /// # Errors
-    /// If products are not finite, or [`IdentifyError::Interrupted`] if `should_continue` returns `false`.
-    pub fn prepare(
-        &self,
-        folds: &[&[usize]],
-        should_continue: &(dyn Fn() -> bool + Sync),
-    ) -> Result<(), IdentifyError> {
+    /// If products are not finite, or `INTERRUPTED` if `should_continue` returns `false`.
+    pub fn prepare(&self, folds: &[&[usize]], should_continue: &(dyn Fn() -> bool + Sync)) -> Result<(), Diagnostic> {
         self.projection(&self.all_folds())?.products(self, 0, should_continue)?;
         let prepared = parallel::map(folds.len(), &|k| {
             self.projection(folds[k])?.products(self, 0, should_continue)?;
@@ -390,7 +387,7 @@ impl<'c> Gram<'c> {
     }
 
     /// The products of a segment with the projected null draws: draws × columns.
-    pub(super) fn null_products(&self, segment: usize) -> Result<Arc<Mat<f64>>, IdentifyError> {
+    pub(super) fn null_products(&self, segment: usize) -> Result<Arc<Mat<f64>>, Diagnostic> {
         stored(&self.null_products, &self.segments[segment].key, || {
             let null = self.null()?;
             debug_assert!(self.draws == 0 || !null.is_empty(), "the draws are not for candidates that are added later");
@@ -402,7 +399,7 @@ impl<'c> Gram<'c> {
             let places = layout.places(&whole.training, &rows, self.draws);
             for part in null.iter() {
                 let formed = layout.products_at(&places, &whole.training, part, false, &|| true);
-                let formed = formed.ok_or(IdentifyError::Interrupted)?.side;
+                let formed = formed.ok_or_else(error::interrupted)?.side;
                 products.as_mut().subrows_mut(first, formed.nrows()).copy_from(&formed);
                 first += formed.nrows();
             }

@@ -13,9 +13,10 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock};
 
-use abbe_identify::error::IdentifyError;
+use abbe_identify::error;
 use abbe_identify::numerics::reduction::orthonormal_basis;
 use abbe_identify::numerics::symmetric::pseudo_inverse;
+use abbe_model::Diagnostic;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 
@@ -107,7 +108,7 @@ fn key(set: &EffectColumns) -> (usize, usize) {
 
 impl Projection {
     /// Of some training folds.
-    pub fn of(gram: &Gram<'_>, folds: &[usize]) -> Result<Projection, IdentifyError> {
+    pub fn of(gram: &Gram<'_>, folds: &[usize]) -> Result<Projection, Diagnostic> {
         let columns = gram.columns;
         let all = gram.all_folds();
         let training = columns.training_rows(folds);
@@ -169,13 +170,13 @@ impl Projection {
     /// The products of a segment.
     ///
     /// # Errors
-    /// [`IdentifyError::Interrupted`] if `should_continue` returns `false`.
+    /// `INTERRUPTED` if `should_continue` returns `false`.
     pub fn products(
         &self,
         gram: &Gram<'_>,
         segment: usize,
         should_continue: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Arc<SegmentProducts>, IdentifyError> {
+    ) -> Result<Arc<SegmentProducts>, Diagnostic> {
         stored(&self.segments, &gram.segments[segment].key, || {
             let products = match &self.left_out {
                 None => self.of_all(gram, segment, should_continue)?,
@@ -189,13 +190,13 @@ impl Projection {
     /// Those with the residuals are formed at once for all of the given projections, which have the same rows.
     ///
     /// # Errors
-    /// [`IdentifyError::Interrupted`] if `should_continue` returns `false`.
+    /// `INTERRUPTED` if `should_continue` returns `false`.
     pub fn take_products(
         projections: &[(&Gram<'_>, Arc<Projection>)],
         segment: usize,
         known: &SegmentProducts,
         should_continue: &(dyn Fn() -> bool + Sync),
-    ) -> Result<(), IdentifyError> {
+    ) -> Result<(), Diagnostic> {
         let Some((first, same)) = projections.first() else { return Ok(()) };
         let mut residuals = Mat::zeros(first.residual.len(), projections.len());
         for (k, (gram, projection)) in projections.iter().enumerate() {
@@ -203,12 +204,12 @@ impl Projection {
         }
         let side = Adjoint::of(&same.training, residuals.as_ref());
         let formed = first.segments[segment].layout.products(&same.training, &side, false, should_continue);
-        let formed = formed.ok_or(IdentifyError::Interrupted)?;
+        let formed = formed.ok_or_else(error::interrupted)?;
         for (k, (gram, projection)) in projections.iter().enumerate() {
             let g = formed.side.row(k).iter().copied().collect();
             let products =
                 SegmentProducts { own: known.own.clone(), d: known.d.clone(), g, with_model: known.with_model.clone() };
-            stored(&projection.segments, &gram.segments[segment].key, || Ok::<_, IdentifyError>(Arc::new(products)))?;
+            stored(&projection.segments, &gram.segments[segment].key, || Ok::<_, Diagnostic>(Arc::new(products)))?;
         }
         Ok(())
     }
@@ -228,11 +229,11 @@ impl Projection {
         gram: &Gram<'_>,
         segment: usize,
         should_continue: &(dyn Fn() -> bool + Sync),
-    ) -> Result<SegmentProducts, IdentifyError> {
+    ) -> Result<SegmentProducts, Diagnostic> {
         let layout = &gram.segments[segment].layout;
         let rank = gram.rank();
         let products = layout.products(&self.training, &*self.side(gram), true, should_continue);
-        let products = products.ok_or(IdentifyError::Interrupted)?;
+        let products = products.ok_or_else(error::interrupted)?;
         let cross = products.side.subrows(0, rank);
         let solved = &self.inverse * cross;
         let mut d = products.own.clone();
@@ -255,7 +256,7 @@ impl Projection {
     }
 
     /// A chosen effect.
-    pub fn chosen(&self, gram: &Gram<'_>, candidate: usize) -> Result<Arc<ChosenEffect>, IdentifyError> {
+    pub fn chosen(&self, gram: &Gram<'_>, candidate: usize) -> Result<Arc<ChosenEffect>, Diagnostic> {
         let set = gram.set(candidate);
         stored(&self.chosen, &key(set), || {
             let mut rows = Mat::zeros(gram.columns.rows(), set.count);
@@ -292,11 +293,11 @@ impl Projection {
         gram: &Gram<'_>,
         chosen: &ChosenEffect,
         segment: usize,
-    ) -> Result<Arc<Mat<f64>>, IdentifyError> {
+    ) -> Result<Arc<Mat<f64>>, Diagnostic> {
         stored(&chosen.segments, &gram.segments[segment].key, || {
             let layout = &gram.segments[segment].layout;
             let products = layout.products(&self.training, &*chosen.side(&self.training), false, &|| true);
-            Ok(Arc::new(products.ok_or(IdentifyError::Interrupted)?.side))
+            Ok(Arc::new(products.ok_or_else(error::interrupted)?.side))
         })
     }
 }
@@ -308,7 +309,7 @@ fn pairs(columns: &std::ops::Range<usize>) -> impl Iterator<Item = (usize, usize
 }
 
 impl LeftOut {
-    fn of(gram: &Gram<'_>, folds: &[usize]) -> Result<LeftOut, IdentifyError> {
+    fn of(gram: &Gram<'_>, folds: &[usize]) -> Result<LeftOut, Diagnostic> {
         let columns = gram.columns;
         let whole = gram.projection(&gram.all_folds())?;
         let training = columns.training_rows(folds);
@@ -343,11 +344,10 @@ impl LeftOut {
         gram: &Gram<'_>,
         segment: usize,
         should_continue: &(dyn Fn() -> bool + Sync),
-    ) -> Result<SegmentProducts, IdentifyError> {
+    ) -> Result<SegmentProducts, Diagnostic> {
         let layout = &gram.segments[segment].layout;
         let all = gram.projection(&gram.all_folds())?.products(gram, segment, should_continue)?;
-        let fold =
-            layout.products(&self.training, &self.side, true, should_continue).ok_or(IdentifyError::Interrupted)?;
+        let fold = layout.products(&self.training, &self.side, true, should_continue).ok_or_else(error::interrupted)?;
         let m = self.along.len();
         let of_model =
             all.with_model.as_ref().map(|solved| &self.r * solved).unwrap_or_else(|| Mat::zeros(m, layout.total()));

@@ -2,8 +2,8 @@
 
 mod shapes;
 
-use abbe_identify::error::IdentifyError;
 use abbe_identify::problem::Problem;
+use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
 use abbe_model::driver::{Driver, Recorded};
@@ -82,8 +82,9 @@ pub struct LibraryEffect {
 ///
 /// # Errors
 /// Only if the compiled library cannot be read.
-pub fn families() -> Result<Vec<Family>, IdentifyError> {
-    let damaged = |cause| IdentifyError::Library(Box::new(cause));
+pub fn families() -> Result<Vec<Family>, Diagnostic> {
+    let damaged =
+        |cause: toml::de::Error| Diagnostic::identification(format!("the library of effects cannot be read: {cause}"));
     let library: Library = toml::from_str(LIBRARY).map_err(damaged)?;
     for family in &library.family {
         let is_named = matches!(Driver::parse(&family.driver), Driver::Axis(_));
@@ -100,7 +101,7 @@ pub fn families() -> Result<Vec<Family>, IdentifyError> {
 ///
 /// # Errors
 /// See [`families`].
-pub fn candidates(problem: &Problem) -> Result<Vec<LibraryEffect>, IdentifyError> {
+pub fn candidates(problem: &Problem) -> Result<Vec<LibraryEffect>, Diagnostic> {
     let sampling = Sampling::of(problem);
     let families = families()?;
     let mut candidates = Vec::new();
