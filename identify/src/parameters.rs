@@ -157,7 +157,7 @@ impl Parameters {
         for name in &session.unknowns {
             let id = name.to_string();
             let Some(slot) = session.machine.error_slot(name) else {
-                return Err(error::no_axis(&session.machine, &format!("`{id}`: "), &name.axis));
+                return Err(error::no_axis(&session.machine, format!("`{id}`: "), &name.axis));
             };
             let unit = name.freedom.unit();
             let index = parameters.push(Parameter {

@@ -250,7 +250,7 @@ fn result_id(session: &Session, id: &str) -> Result<String, Diagnostic> {
         .axis_index(&name.axis)
         .or_else(|| machine.axes.iter().position(|axis| axis.name.to_lowercase() == lower));
     let Some(axis) = axis else {
-        return Err(error::no_axis(machine, &format!("`{id}`: "), &name.axis));
+        return Err(error::no_axis(machine, format!("`{id}`: "), &name.axis));
     };
     name.axis.clone_from(&machine.axes[axis].name);
     Ok(name.to_string())

@@ -17,6 +17,7 @@ use abbe_identify::linear::{Linearisation, is_of_interest};
 use abbe_identify::numerics::ranking::largest_first;
 use abbe_identify::problem::Problem;
 use abbe_identify::unit::ParameterUnit;
+use abbe_model::Diagnostic;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::effect::shape::Harmonic;
 use abbe_model::effect::{Component, Effect, Shape};

@@ -150,7 +150,7 @@ impl Analysis {
     }
 
     fn model(&self, py: Python<'_>) -> PyResult<Model> {
-        work::at_once(py, || Model::of(self.analysed.model::<Failed>(&self.origin)?))
+        work::at_once(py, || Model::of(self.analysed.model(&self.origin)?))
     }
 
     /// The session of a trace with the found effects declared.

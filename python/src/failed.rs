@@ -1,7 +1,7 @@
 //! Errors of the library as exceptions of `abbe`, with the same text.
 
 use abbe::model::Diagnostic;
-use abbe::model::diagnostic::Area;
+use abbe::model::diagnostic::{Area, Help};
 use abbe::model::words::shortened;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -17,7 +17,7 @@ impl Failed {
     }
 
     /// An argument that cannot be used.
-    pub fn argument(message: impl Into<String>, help: impl Into<String>) -> Failed {
+    pub fn argument(message: impl Into<String>, help: impl Into<Help>) -> Failed {
         Failed(Diagnostic::session(message, help))
     }
 }

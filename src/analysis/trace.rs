@@ -108,7 +108,7 @@ impl Analysis for TraceOutcome {
         };
         let mut found = trace(session_of(given)?, &options.with_seed(seed), &report)?;
         if let Some(error) = refused.lock().ok().and_then(|mut refused| refused.take()) {
-            return Err(error.into());
+            return Err(error);
         }
         report(Progress::ComparingTests);
         separate_aliases(&mut found, &TestVariations::short(), &report)?;

@@ -106,7 +106,7 @@ pub fn check(folder: &Path, force: bool) -> Result<bool, Diagnostic> {
         return Err(Diagnostic::other(format!("{}: this is a file; name a folder", folder.display())));
     }
     let present = folder.is_dir();
-    if present && !force && std::fs::read_dir(folder).map_err(|source| fault(folder, source))?.next().is_some() {
+    if present && !force && std::fs::read_dir(folder).map_err(|source| unwritable(folder, source))?.next().is_some() {
         return Err(Diagnostic::other(format!(
             "{}: the folder exists and is not empty; name another, or use --force to replace files with the same names",
             folder.display()

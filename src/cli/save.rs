@@ -10,7 +10,6 @@ use abbe::identify::problem::Problem;
 use abbe::model::Diagnostic;
 use clap::Args;
 
-use super::failure::command_line;
 use super::{json, output};
 
 /// The file of the model.

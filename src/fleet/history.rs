@@ -8,6 +8,7 @@ use abbe_apply::history::results::{History, MachineHistory, ParameterHistory};
 use abbe_apply::history::{HistoryOptions, MachineSessions, SessionValues, analyse};
 use abbe_identify::results::validation::ValidationVerdict;
 use abbe_identify::results::{Estimate, MeasuredValue, NextStep, Statements};
+use abbe_model::Diagnostic;
 use schemars::JsonSchema;
 use serde::Serialize;
 

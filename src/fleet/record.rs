@@ -12,6 +12,7 @@ use abbe_identify::problem::Problem;
 use abbe_identify::results::validation::ValidationVerdict;
 use abbe_identify::results::{EffectName, Estimate, ModelResult, TraceVerdict};
 use abbe_identify::tolerance::Conformity;
+use abbe_model::Diagnostic;
 use faer::Mat;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

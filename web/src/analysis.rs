@@ -59,7 +59,7 @@ impl Analysis {
 
     /// The file of `--save`.
     pub fn model(&self) -> Result<String, Failed> {
-        Ok(self.analysed.model::<Failed>(&self.read.origin)?.to_text()?)
+        Ok(self.analysed.model(&self.read.origin)?.to_text()?)
     }
 
     /// The session of `--write`: the same with the found effects declared.

@@ -32,7 +32,7 @@ impl From<Diagnostic> for Failed {
 
 impl From<String> for Failed {
     fn from(message: String) -> Failed {
-        Diagnostic::other(message)
+        Diagnostic::other(message).into()
     }
 }
 

@@ -3,8 +3,9 @@
 use std::collections::BTreeSet;
 
 use abbe_model::component::ErrorKind;
+use abbe_model::diagnostic::Help;
 use abbe_model::document::effect::{self as document, SCALES};
-use abbe_model::document::fault::{Fault, Help, Within};
+use abbe_model::document::fault::{Fault, Within};
 use abbe_model::document::schema;
 use abbe_model::document::value::Positive;
 use abbe_model::driver::{Driver, column};

@@ -113,7 +113,8 @@ fn of_test(session: &Session, test: &Test, left_out: &[bool]) -> Option<Diagonal
     let factor = way.sign * unit.per_internal();
     let deviation = |row: usize, values: &[f64]| (values[0] - nominal[row]) * factor;
     let positions = approaches(readings, left_out, 0, &way.places, |at| at, deviation);
-    let read = Deviations::of(test, unit.name().to_string(), AxisKind::Linear.unit().name(), positions, Some(way.length));
+    let read =
+        Deviations::of(test, unit.name().to_string(), AxisKind::Linear.unit().name(), positions, Some(way.length));
     let kind = if axes.len() == 2 { DiagonalKind::Face } else { DiagonalKind::Body };
     let has_figure =
         ["systematic_forward", "systematic_backward"].iter().any(|id| figure::find(&read.figures, id).is_some());

@@ -3,11 +3,12 @@
 use abbe::analysis::{self, Analysed, Given};
 use abbe::document::Origin;
 use abbe::files::{ReadOptions, session_with_sources};
+use abbe::model::Diagnostic;
 use abbe::model::session::Session;
 
 use crate::suite::{abbe, ready, text};
 
-fn run(name: &str, session: &Session, options: &str) -> Result<Analysed, Box<dyn std::error::Error>> {
+fn run(name: &str, session: &Session, options: &str) -> Result<Analysed, Diagnostic> {
     analysis::run(name, &[Given::Session(session)], options, 1, &|_| true)
 }
 

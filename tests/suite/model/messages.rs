@@ -1,5 +1,7 @@
 //! Messages on standard error: one form, colour on a terminal only, and counts that agree in number.
 
+use abbe::model::Diagnostic;
+use abbe::model::diagnostic::{FILE_ACCESS, Location};
 use std::fs;
 use std::process::{Command, Output};
 
@@ -126,4 +128,14 @@ fn one_test_and_two_tests() {
     let planned = String::from_utf8(planned.stdout).unwrap();
     assert!(planned.contains("\n90 readings in 1 test, 1 set-up,"), "{planned}");
     assert!(planned.contains("The plan identifies its 1 error;"), "{planned}");
+}
+
+#[test]
+fn a_diagnostic_has_its_place_before_the_message_and_no_empty_help() {
+    let file = std::path::Path::new("run/xy.csv");
+    let found = Diagnostic::input(Location::line(file, 7), "a row of 3 cells", "");
+    assert_eq!((found.to_string().as_str(), found.help()), ("run/xy.csv:7: a row of 3 cells", None));
+    let whole = Diagnostic::other("cannot be read").at(Location::file(file));
+    assert_eq!((whole.to_string().as_str(), whole.message.as_str()), ("run/xy.csv: cannot be read", "cannot be read"));
+    assert_ne!(whole.code, Diagnostic::coded(FILE_ACCESS, "cannot be read").code);
 }

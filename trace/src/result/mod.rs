@@ -12,6 +12,7 @@ use abbe_identify::fit::{self, Fit, JudgedBy, prepare_with};
 use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{EffectResult, Estimate, ParameterChange, TraceResult};
+use abbe_model::Diagnostic;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::words::listed;

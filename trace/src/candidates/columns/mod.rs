@@ -14,6 +14,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 
 use abbe_identify::numerics::parallel;
 use abbe_identify::problem::{Problem, RowBlock};
+use abbe_model::Diagnostic;
 use abbe_model::driver::DriverSample;
 use abbe_model::sensitivity::Sensitivities;
 use abbe_model::unit::Unit;
