@@ -20,6 +20,8 @@ use crate::problem::Problem;
 
 /// Poses that are refitted with each mistake.
 const MAX_POSES: usize = 300;
+/// Poses by which the nominal machine is judged with every fit.
+const MAX_JUDGED: usize = 60;
 /// Least factor by which a mistake lowers the residual of the nominal machine.
 const LOWERED: f64 = 3.0;
 /// Mistakes whose residual is below this multiple of the least residual are also listed.
@@ -72,9 +74,9 @@ pub(super) fn spread_mm2(problem: &Problem) -> Option<f64> {
     (spread > (MIN_UM * 1e-3).powi(2) && spread.is_finite()).then_some(spread)
 }
 
-/// The nominal machine before some of the poses: only the set-up is unknown.
-fn nominal(problem: &Problem) -> Session {
-    let mut nominal = thinned(problem, MAX_POSES);
+/// The nominal machine before at most about so many of the poses: only the set-up is unknown.
+fn nominal(problem: &Problem, most: usize) -> Session {
+    let mut nominal = thinned(problem, most);
     nominal.unknowns.clear();
     nominal.effects.clear();
     nominal
@@ -83,7 +85,7 @@ fn nominal(problem: &Problem) -> Session {
 /// The misfit of the nominal machine: see [`super::nominal_misfit`].
 pub(super) fn nominal_misfit(session: &Session) -> Option<f64> {
     let noise = Noise::white(NOISE_MM, NoiseSource::Stated);
-    let nominal = nominal(&Problem::new(session, noise.clone(), 1).ok()?);
+    let nominal = nominal(&Problem::new(session, noise.clone(), 1).ok()?, MAX_POSES);
     let problem = Problem::new(&nominal, noise.clone(), 1).ok()?;
     Some(trial(&nominal, &noise)?.rms_mm / spread_mm2(&problem).map_or(1.0, f64::sqrt))
 }
@@ -98,7 +100,7 @@ pub(super) struct Left {
 
 /// What the nominal machine leaves.
 pub(super) fn left_by_nominal(problem: &Problem) -> Option<Left> {
-    left(&nominal(problem))
+    left(&nominal(problem, MAX_JUDGED))
 }
 
 /// Fits a session in which a turn of a radian weighs as much as the spread. The lever of a session that states no noise follows
@@ -113,7 +115,7 @@ fn left(session: &Session) -> Option<Left> {
 
 /// The mistakes with which the nominal machine fits poses far better, the best first.
 pub(super) fn suggestions(problem: &Problem) -> Vec<Suggestion> {
-    let mut nominal = nominal(problem);
+    let mut nominal = nominal(problem, MAX_POSES);
     nominal.lever_mm = spread_mm2(problem).map_or(nominal.lever_mm, f64::sqrt);
     let base = left(&nominal).map_or(f64::INFINITY, |left| left.share);
     let hypotheses = of_poses(&nominal);
