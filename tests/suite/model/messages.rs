@@ -1,9 +1,10 @@
 //! Messages on standard error: one form, colour on a terminal only, and counts that agree in number.
 
-use abbe::model::Diagnostic;
-use abbe::model::diagnostic::{FILE_ACCESS, Location};
 use std::fs;
 use std::process::{Command, Output};
+
+use abbe::model::Diagnostic;
+use abbe::model::diagnostic::{FILE_ACCESS, Location};
 
 use crate::suite::command::faults::TestFolder;
 

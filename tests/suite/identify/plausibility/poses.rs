@@ -1,13 +1,12 @@
 //! Poses of the UR10 whose columns are misread.
 
-use abbe::identify::results::TraceVerdict;
-use abbe::model::Diagnostic;
 use std::sync::Arc;
 
 use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::plausibility::{ConflictKind, SuggestionKind};
-use abbe::identify::results::FitResult;
+use abbe::identify::results::{FitResult, TraceVerdict};
+use abbe::model::Diagnostic;
 use abbe::model::session::Session;
 use abbe::trace::{TraceOptions, trace};
 use test_needs::data;
