@@ -4,7 +4,7 @@
 //! - [`scalar`]: numeric types of the chain; [`expression`]: the symbolic scalar;
 //! - [`frames`], [`axis`], [`chain`]: transformation of points through a machine;
 //! - [`component`], [`effect`], [`driver`]: names of errors, and their dependence on drivers; [`pattern`]: one name for
-//!   several errors;
+//!   several errors; [`parameter_id`]: what a parameter is;
 //! - [`instrument`]: readings from states of the axes;
 //! - [`sensitivity`]: readings and their derivatives by every component; [`replay`]: evaluation over columns of
 //!   readings;
@@ -64,6 +64,7 @@ pub mod expression;
 pub mod frames;
 pub mod instrument;
 pub mod median;
+pub mod parameter_id;
 pub mod pattern;
 pub mod pose;
 pub mod replay;

@@ -22,6 +22,7 @@ pub use shape::Shape;
 use crate::axis::AxisKind;
 use crate::chain::Machine;
 use crate::driver::{Driver, DriverSample, DriverUnit};
+use crate::parameter_id::EffectId;
 
 /// An effect: component × driver × shape.
 ///
@@ -174,7 +175,6 @@ impl Effect {
 
     /// The identifier used in results: `EZC~C:h2` (component, driver, shape).
     pub fn id(&self) -> String {
-        let tests = if self.tests.is_empty() { String::new() } else { format!("[{}]", self.tests.join("+")) };
-        format!("{}~{}:{}{tests}", self.component, self.driver, self.shape.tag())
+        EffectId::of(self, 1).to_string()
     }
 }

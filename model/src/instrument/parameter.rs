@@ -1,5 +1,6 @@
 //! Parameters of an instrument: what a fit may estimate of its set-up.
 
+use crate::parameter_id::ParameterId;
 use crate::unit::InternalUnit;
 
 /// The tests that share an instrument parameter: those that use the same mounted object.
@@ -35,6 +36,12 @@ pub struct InstrumentParameter {
 }
 
 impl InstrumentParameter {
+    /// Its identifier where the tests of a group share it.
+    pub fn id(&self, group: &str) -> ParameterId {
+        let (thing, coordinate) = (self.thing.to_string(), self.coordinate.to_string());
+        ParameterId::Setup { thing, coordinate, group: group.to_string() }
+    }
+
     pub(super) const fn new(
         thing: &'static str,
         coordinate: &'static str,
