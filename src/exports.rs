@@ -14,9 +14,8 @@ use abbe_files::Source;
 use abbe_files::robot::dh::{self as table, Convention};
 use abbe_identify::error;
 use abbe_identify::model_file::IdentifiedModel;
-use abbe_identify::parameters::Role;
 use abbe_model::Diagnostic;
-use abbe_model::component::{ErrorKind, ErrorName};
+use abbe_model::component::ErrorKind;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -290,10 +289,10 @@ fn of_control(model: &IdentifiedModel, control: &Control, options: &ExportOption
 
 /// The location errors in a format of compensation tables, and what it does not hold.
 fn of_locations(model: &IdentifiedModel, format: &TableFormat) -> Result<Exported, Diagnostic> {
-    let errors = model.parameters.iter().enumerate().filter(|(_, parameter)| parameter.role == Role::Error);
+    let errors = model.parameters.iter().enumerate().filter(|(_, parameter)| parameter.id.is_error());
     let named = errors
         .filter(|(index, _)| model.is_estimated(*index))
-        .filter_map(|(_, parameter)| Some((ErrorName::parse(&parameter.id)?, parameter.value)));
+        .filter_map(|(_, parameter)| Some((parameter.id.error()?.clone(), parameter.value)));
     let locations = named.filter(|(name, _)| name.kind == ErrorKind::Location).collect();
     let compensation = Compensation { locations, left_out: left_out(model), ..Compensation::default() };
     let tables = compensation::tables(&model.machine, &compensation, format, MAX_POINTS);

@@ -9,6 +9,7 @@ use abbe_model::driver::Driver;
 use abbe_model::effect::shape::Per;
 use abbe_model::effect::{Component, Effect};
 use abbe_model::instrument::InstrumentParameter;
+use abbe_model::parameter_id::{EffectId, ParameterId, Part};
 use abbe_model::unit::InternalUnit;
 
 use crate::error;
@@ -73,11 +74,8 @@ impl Coefficient {
 
     /// The identifier as in the results of a fit: `EZC~C:h2.cos`.
     pub fn id(&self) -> String {
-        let names = self.effect.shape.coefficient_names();
-        match names.get(self.index).map(String::as_str) {
-            None | Some("") => self.effect.id(),
-            Some(name) => format!("{}.{name}", self.effect.id()),
-        }
+        let name = self.effect.shape.coefficient_names().get(self.index).cloned().unwrap_or_default();
+        ParameterId::Effect(Arc::new(EffectId::of(&self.effect, 1)), Part::Coefficient(name)).to_string()
     }
 
     pub(crate) fn meaning(&self) -> String {

@@ -110,8 +110,7 @@ impl Variable {
             Variable::Length(name) => name.clone(),
             Variable::Position { axis, .. } => axis.clone(),
             Variable::Error(name) => name.to_string(),
-            Variable::Instrument(unknown) if unknown.coordinate.is_empty() => unknown.thing.to_string(),
-            Variable::Instrument(unknown) => format!("{}.{}", unknown.thing, unknown.coordinate),
+            Variable::Instrument(unknown) => unknown.id("").to_string(),
             Variable::Driver(followed) => followed.meaning.clone(),
             Variable::Coefficient(coefficient) => coefficient.id(),
         }

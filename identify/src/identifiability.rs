@@ -2,6 +2,7 @@
 //! described in words.
 
 use abbe_model::Diagnostic;
+use abbe_model::parameter_id::ParameterId;
 use faer::Mat;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -11,7 +12,7 @@ use crate::numerics::null_space::{combinations, echelon};
 use crate::numerics::rank::Rank;
 use crate::numerics::ranking::smallest_first;
 use crate::numerics::solve::Svd;
-use crate::parameters::{Parameter, Role};
+use crate::parameters::Parameter;
 use crate::problem::Problem;
 use crate::results::{Combination, DeterminedByPrior, Finding, Unobservable};
 
@@ -44,29 +45,26 @@ const CONFOUNDED: &str = "is confounded with";
 const MIN_PART: f64 = 0.1;
 
 /// The name of a quantity and its group: `spindle_ball.z[A150]` is `z of the spindle ball` in `A150`.
-fn name_of<'i>(list: &[Parameter], id: &'i str) -> (String, Option<&'i str>) {
-    let setup = list.iter().any(|parameter| parameter.id == id && parameter.role == Role::Setup);
-    if !setup {
-        return (id.to_string(), None);
-    }
-    let (quantity, group) = id.split_once('[').unwrap_or((id, ""));
-    let (quantity, coordinate) = quantity.split_once('.').unwrap_or((quantity, ""));
+fn name_of(id: &ParameterId) -> (String, Option<&str>) {
+    let ParameterId::Setup { thing, coordinate, .. } = id else { return (id.to_string(), None) };
     let of = if coordinate.is_empty() { String::new() } else { format!("{coordinate} of ") };
-    (format!("{of}the {}", quantity.replace('_', " ")), group.strip_suffix(']'))
+    (format!("{of}the {}", thing.replace('_', " ")), id.group())
+}
+
+/// A combination by the identifiers of its parameters.
+fn named<C: FromIterator<(String, f64)>>(combination: &[(&Parameter, f64)]) -> C {
+    combination.iter().map(|(parameter, value)| (parameter.id.to_string(), *value)).collect()
 }
 
 /// Describes a combination: the confounded quantities and their proportion, with units if they differ. A quantity that
 /// occurs in several tests is named once. A long combination is shortened.
-fn describe(list: &[Parameter], combination: &[(String, f64)], verb: &str) -> String {
-    let unit_of = |id: &str| {
-        list.iter().find(|parameter| parameter.id == id).map_or("", |parameter| parameter.unit.name.as_str())
-    };
-    let first_unit = combination.first().map_or("", |(id, _)| unit_of(id));
-    let mixed = combination.iter().any(|(id, _)| unit_of(id) != first_unit);
+fn describe(combination: &[(&Parameter, f64)], verb: &str) -> String {
+    let mixed = combination.iter().any(|(parameter, _)| parameter.unit.name != combination[0].0.unit.name);
     let mut quantities: Vec<(String, Vec<&str>, String)> = Vec::new();
-    for (id, value) in combination {
-        let (quantity, group) = name_of(list, id);
-        let value = if mixed { format!("{} {}", format_short(*value), unit_of(id)) } else { format_short(*value) };
+    for (parameter, value) in combination {
+        let (quantity, group) = name_of(&parameter.id);
+        let value = format_short(*value);
+        let value = if mixed { format!("{value} {}", parameter.unit.name) } else { value };
         match quantities.iter_mut().find(|(other, groups, v)| *other == quantity && *v == value && !groups.is_empty()) {
             Some((_, groups, _)) => groups.extend(group),
             None => quantities.push((quantity, group.into_iter().collect(), value)),
@@ -110,23 +108,23 @@ pub fn unidentifiable(problem: &Problem, rank: &Rank) -> Vec<Unobservable> {
         let finding = if weak_u.is_some() { Finding::Weak } else { Finding::Structural };
         let why = match (weak_u, combination.as_slice()) {
             (Some(u), _) => {
-                let others: Vec<&str> = combination[1..].iter().map(|(id, _)| id.as_str()).collect();
+                let others: Vec<String> = combination[1..].iter().map(|(other, _)| other.id.to_string()).collect();
                 weak(&list[*pivot], &others, *u)
             }
-            (None, [(id, _)]) => {
-                let (quantity, group) = name_of(list, id);
+            (None, [(alone, _)]) => {
+                let (quantity, group) = name_of(&alone.id);
                 let place = group.map_or(String::new(), |group| format!(" in {group}"));
                 format!("no reading of these tests changes with {quantity}{place}")
             }
-            (None, _) => describe(list, &combination, CONFOUNDED),
+            (None, _) => describe(&combination, CONFOUNDED),
         };
-        Unobservable { combination: combination.into_iter().collect(), finding, why }
+        Unobservable { combination: named(&combination), finding, why }
     })
     .collect()
 }
 
 /// Describes a weak combination: a parameter, the others that change with it, and the standard uncertainty in physical sizes.
-pub(crate) fn weak(leader: &Parameter, others: &[&str], u: f64) -> String {
+pub(crate) fn weak(leader: &Parameter, others: &[String], u: f64) -> String {
     let u = format_short(u * leader.size * leader.unit.display_per_internal);
     let together = match others {
         [] => String::new(),
@@ -140,19 +138,12 @@ pub(crate) fn weak(leader: &Parameter, others: &[&str], u: f64) -> String {
 
 /// A row over scaled parameters in display units: the pivot first, with 1, then the others in the order of the
 /// parameters.
-fn in_display_units(problem: &Problem, row: &[f64], pivot: usize) -> Vec<(String, f64)> {
+fn in_display_units<'p>(problem: &'p Problem, row: &[f64], pivot: usize) -> Vec<(&'p Parameter, f64)> {
     let list = &problem.parameters.list;
     let largest = row.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     let others = (0..row.len()).filter(|j| *j != pivot && row[*j].abs() > NEGLIGIBLE * largest);
-    let entries: Vec<(String, f64)> = std::iter::once(pivot)
-        .chain(others)
-        .map(|j| {
-            let parameter = &list[j];
-            (parameter.id.clone(), row[j] * parameter.size * parameter.unit.display_per_internal)
-        })
-        .collect();
-    let leading = entries.first().map_or(1.0, |(_, value)| *value);
-    entries.into_iter().map(|(id, value)| (id, value / leading)).collect()
+    let display = |j: usize| row[j] * list[j].size * list[j].unit.display_per_internal;
+    std::iter::once(pivot).chain(others).map(|j| (&list[j], display(j) / display(pivot))).collect()
 }
 
 /// The errors that the readings alone confound with set-up quantities, one sparse combination each. They follow from
@@ -189,8 +180,8 @@ pub fn determined_by_prior(problem: &Problem, linear: &Linearisation) -> Result<
         if combination.len() < 2 {
             continue;
         }
-        let why = describe(list, &combination, CONFOUNDED);
-        held.push(DeterminedByPrior { error: list[error].id.clone(), combination, why });
+        let why = describe(&combination, CONFOUNDED);
+        held.push(DeterminedByPrior { error: list[error].id.to_string(), combination: named(&combination), why });
     }
     Ok(held)
 }
@@ -268,14 +259,13 @@ pub fn nearly_collinear(
         }
         let raw = chosen.iter().map(|(j, v)| {
             let parameter = &list[identifiable[*j]];
-            (parameter.id.clone(), v / norm[*j] * parameter.unit.display_per_internal)
+            (parameter, v / norm[*j] * parameter.unit.display_per_internal)
         });
-        let raw: Vec<(String, f64)> = raw.collect();
-        let leading = raw[0].1;
-        let combination: Vec<(String, f64)> = raw.into_iter().map(|(id, v)| (id, v / leading)).collect();
-        let why =
-            describe(list, &combination, &format!("is nearly collinear (condition index {condition_index:.0}) with"));
-        found.push(NearDependency { condition_index, combination, why });
+        let mut combination: Vec<(&Parameter, f64)> = raw.collect();
+        let leading = combination[0].1;
+        combination.iter_mut().for_each(|(_, value)| *value /= leading);
+        let why = describe(&combination, &format!("is nearly collinear (condition index {condition_index:.0}) with"));
+        found.push(NearDependency { condition_index, combination: named(&combination), why });
     }
     Ok(found)
 }
@@ -290,27 +280,23 @@ mod tests {
     /// with one value is one.
     #[test]
     fn a_long_combination_names_five_quantities() {
-        let parameter = |id: &str, role: Role| {
+        let parameter = |id: &str| {
             let unit = abbe_model::unit::Unit::Micrometre.into();
-            Parameter { id: id.into(), unit, size: 1.0, prior: Prior::Free, role, found: 0.0 }
+            let id = id.parse().unwrap();
+            Parameter { id, unit, size: 1.0, prior: Prior::Free, effect: None, index: 0, found: 0.0 }
         };
         let ids = ["EX0C", "EY0C", "EX0A", "EY0A", "EZ0A", "EX0B", "EY0B"];
-        let list: Vec<Parameter> = ids.iter().map(|id| parameter(id, Role::Error)).collect();
-        let of = |count: usize| -> Vec<(String, f64)> {
-            ids[..count].iter().enumerate().map(|(k, id)| (id.to_string(), 1.0 + k as f64)).collect()
+        let list: Vec<Parameter> = ids.iter().map(|id| parameter(id)).collect();
+        let of = |count: usize| -> Vec<(&Parameter, f64)> {
+            list[..count].iter().enumerate().map(|(k, parameter)| (parameter, 1.0 + k as f64)).collect()
         };
         let six = "EX0C is confounded with EY0C, EX0A, EY0A, EZ0A, EX0B: 1 : 2 : 3 : 4 : 5 : 6";
-        assert_eq!(describe(&list, &of(6), CONFOUNDED), six);
+        assert_eq!(describe(&of(6), CONFOUNDED), six);
         let seven = "EX0C is confounded with EY0C, EX0A, EY0A, EZ0A and 2 more together: 1 : 2 : 3 : 4 : 5 : …";
-        assert_eq!(describe(&list, &of(7), CONFOUNDED), seven);
-        let list = [
-            parameter("EX0C", Role::Error),
-            parameter("workpiece_ball.x[A100]", Role::Setup),
-            parameter("workpiece_ball.x[A150]", Role::Setup),
-        ];
-        let shared = [("EX0C", 1.0), ("workpiece_ball.x[A100]", -2.0), ("workpiece_ball.x[A150]", -2.0)];
-        let shared = shared.map(|(id, value)| (id.to_string(), value));
+        assert_eq!(describe(&of(7), CONFOUNDED), seven);
+        let list = ["EX0C", "workpiece_ball.x[A100]", "workpiece_ball.x[A150]"].map(parameter);
+        let shared = [(&list[0], 1.0), (&list[1], -2.0), (&list[2], -2.0)];
         let words = "EX0C is confounded with x of the workpiece ball in A100 and A150: 1 : −2";
-        assert_eq!(describe(&list, &shared, CONFOUNDED), words);
+        assert_eq!(describe(&shared, CONFOUNDED), words);
     }
 }

@@ -10,7 +10,7 @@ use faer::Mat;
 
 use crate::numerics::rank::Rank;
 use crate::numerics::triangle::Triangle;
-use crate::parameters::{Parameter, Role, pivot_preference};
+use crate::parameters::{Parameter, pivot_preference};
 use crate::problem::Problem;
 
 /// A plan, linearised at nominal parameters.
@@ -87,7 +87,7 @@ impl Linearisation {
 /// Whether a parameter is a target of the plan: an error of the machine or a coefficient of a declared effect, not a
 /// set-up quantity or a number of a shape.
 pub fn is_of_interest(parameter: &Parameter) -> bool {
-    matches!(parameter.role, Role::Error | Role::Coefficient { .. })
+    parameter.id.is_error() || parameter.id.is_coefficient()
 }
 
 /// The prior standard uncertainty of a set-up quantity, internal unit.

@@ -4,22 +4,19 @@
 use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName};
-use abbe_model::effect::{Component, Effect};
+use abbe_model::effect::Component;
 
-use crate::parameters::Role;
 use crate::problem::Problem;
 use abbe_model::effect::description::{component_meaning, meaning};
+use abbe_model::parameter_id::{ParameterId, Part};
 
-/// The description of a location error or an error motion; empty if the name is not an error of ISO 230-1.
-pub(crate) fn error_meaning(machine: &Machine, id: &str) -> String {
-    let Some(name) = ErrorName::parse(id) else {
-        return String::new();
-    };
-    let reference = match squareness_reference(machine, &name) {
+/// The description of a location error or an error motion.
+pub(crate) fn error_meaning(machine: &Machine, name: &ErrorName) -> String {
+    let reference = match squareness_reference(machine, name) {
         Some(axis) => format!(" (squareness to {axis})"),
         None => String::new(),
     };
-    format!("{}{reference}", component_meaning(machine, &Component::Axis(name)))
+    format!("{}{reference}", component_meaning(machine, &Component::Axis(name.clone())))
 }
 
 /// The linear axis relative to which an orientation error of a rotary axis is a squareness error. A tilt about one
@@ -39,53 +36,33 @@ fn squareness_reference(machine: &Machine, name: &ErrorName) -> Option<String> {
     machine.axes.iter().find(is_reference).map(|other| other.name.clone())
 }
 
-/// The description of a set-up parameter: `A100: bar length`, `P1: workpiece ball, shift in X`. Empty if the identifier
-/// is not a set-up parameter.
-pub(crate) fn setup_meaning(machine: &Machine, id: &str) -> String {
-    let (quantity, group) = match id.strip_suffix(']').and_then(|id| id.split_once('[')) {
-        Some((quantity, group)) => (quantity, Some(group)),
-        None => (id, None),
-    };
-    let (thing, coordinate) = quantity.split_once('.').unwrap_or((quantity, ""));
-    let component = Component::Instrument { thing: thing.to_string(), coordinate: coordinate.to_string() };
+/// The description of a set-up parameter: `A100: bar length`, `P1: workpiece ball, shift in X`.
+fn setup_meaning(machine: &Machine, [thing, coordinate, group]: [&String; 3]) -> String {
+    let component = Component::Instrument { thing: thing.clone(), coordinate: coordinate.clone() };
     let described = component_meaning(machine, &component);
-    let quantity = match thing {
-        "bar" => format!("{} {}", described.part, described.what),
-        _ => format!("{}, {}", described.part, described.what),
-    };
-    match group {
-        Some(group) => format!("{group}: {quantity}"),
-        None => quantity,
-    }
+    let comma = if thing == "bar" { "" } else { "," };
+    let colon = if group.is_empty() { "" } else { ": " };
+    format!("{group}{colon}{}{comma} {}", described.part, described.what)
 }
 
-/// The description of a coefficient: the effect, then the coefficient if the effect has several.
-pub(crate) fn coefficient_meaning(machine: &Machine, effect: &Effect, coefficient: &str) -> String {
-    let effect = meaning(machine, effect);
-    match coefficient {
-        "" => effect.to_string(),
-        "amplitude" | "phase" | "rms" | "cos" | "sin" => format!("{effect}, {coefficient}"),
-        number => format!("{effect}, coefficient {number}"),
-    }
-}
-
-/// The description of parameter `index` of a problem. `coefficient` replaces the name of a coefficient: `amplitude`,
-/// `phase`.
-pub fn parameter_meaning(problem: &Problem, index: usize, coefficient: Option<&str>) -> String {
+/// The description of parameter `index` of a problem. `part` replaces that of its effect: amplitude, phase.
+pub fn parameter_meaning(problem: &Problem, index: usize, part: Option<&Part>) -> String {
     let (machine, parameter) = (&problem.session.machine, &problem.parameters.list[index]);
-    match parameter.role {
-        Role::Number { effect, number } => {
-            let effect = &problem.parameters.effects[effect];
-            let name = effect.shape.reported().get(number).map_or("", |(name, _)| *name);
-            format!("{}, {name}", meaning(machine, effect))
-        }
-        Role::Error => error_meaning(machine, &parameter.id),
-        Role::Setup => setup_meaning(machine, &parameter.id),
-        Role::Coefficient { effect, coefficient: k } => {
-            let effect = &problem.parameters.effects[effect];
-            let names = effect.shape.coefficient_names();
-            let name = coefficient.or(names.get(k).map(String::as_str)).unwrap_or_default();
-            coefficient_meaning(machine, effect, name)
-        }
+    let of_effect = |effect: usize| &problem.parameters.effects[effect];
+    match &parameter.id {
+        ParameterId::Error(name) => error_meaning(machine, name),
+        ParameterId::Setup { thing, coordinate, group } => setup_meaning(machine, [thing, coordinate, group]),
+        ParameterId::Effect(_, own) => parameter.effect.map(of_effect).map_or_else(String::new, |effect| {
+            let words = meaning(machine, effect);
+            match part.unwrap_or(own) {
+                Part::Number(_) => {
+                    let name = effect.shape.reported().get(parameter.index).map_or("", |(name, _)| *name);
+                    format!("{words}, {name}")
+                }
+                Part::Coefficient(name) if name.is_empty() => words.to_string(),
+                part if part.is_numbered() => format!("{words}, coefficient {part}"),
+                part => format!("{words}, {part}"),
+            }
+        }),
     }
 }

@@ -10,6 +10,7 @@ use abbe_model::Diagnostic;
 use abbe_model::driver::Reference;
 use abbe_model::effect::{CoefficientPrior, Component, Effect};
 use abbe_model::instrument::InstrumentKind;
+use abbe_model::parameter_id::{EffectId, ParameterId, Part};
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::{Prior, Session, Test};
 use abbe_model::unit::InternalUnit;
@@ -18,48 +19,38 @@ use crate::error;
 use crate::start::{point_mm, points};
 use crate::unit::ParameterUnit;
 use basis::BasisOverTest;
-pub(crate) use preference::{natural, pivot_preference};
-
-/// The kind of a parameter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
-    /// A location error or a constant error of an axis (PIGE).
-    Error,
-    /// A set-up quantity of the instrument.
-    Setup,
-    /// A coefficient of an effect.
-    Coefficient {
-        /// Index among the effects.
-        effect: usize,
-        /// Index among its coefficients.
-        coefficient: usize,
-    },
-    /// A number of the shape of an effect, as its change from the number of the shape. The readings depend on it through
-    /// the coefficients `c`: `∂component/∂n = Σ_k c_k · ∂b_k(driver; n)/∂n`.
-    Number {
-        /// Index among the effects.
-        effect: usize,
-        /// Index among the numbers of the shape.
-        number: usize,
-    },
-}
+pub(crate) use preference::{kind, natural, pivot_preference};
 
 /// One parameter.
 #[derive(Clone, Debug)]
 pub struct Parameter {
-    /// Identifier in results: `EY0A`, `bar[A100]`, `EZC~C:h2.cos`.
-    pub id: String,
+    /// What it is. A number of a shape is its change from the number of the shape.
+    pub id: ParameterId,
     /// Display unit.
     pub unit: ParameterUnit,
     /// Physical size, internal units: 1 mm, 0.01 rad, or the value that changes the component by that much.
     pub size: f64,
     /// The prior.
     pub prior: Prior,
-    /// The kind.
-    pub role: Role,
+    /// Index of its effect among the effects, of a coefficient or a number of a shape.
+    pub effect: Option<usize>,
+    /// Index among the coefficients of its effect, or among the numbers of its shape.
+    pub index: usize,
     /// Where it was found before the fit, less the stated value, internal units: a coordinate of a free point. Estimates
     /// count from there.
     pub found: f64,
+}
+
+impl Parameter {
+    /// The effect of which it is a coefficient.
+    pub fn coefficient_of(&self) -> Option<usize> {
+        self.effect.filter(|_| self.id.is_coefficient())
+    }
+
+    /// The effect of whose shape it is a number.
+    pub fn number_of(&self) -> Option<usize> {
+        self.effect.filter(|_| self.id.is_number())
+    }
 }
 
 /// The contribution of a parameter to a slot of a test: a constant, or a basis function row by row.
@@ -115,9 +106,8 @@ pub struct Parameters {
     pub known: Vec<SlotValues>,
     /// The effects whose coefficients are parameters.
     pub effects: Vec<Effect>,
-    /// Their identifiers: [`Effect::id`]. Effects that differ only in the numbers of their shapes are numbered from the
-    /// second on.
-    pub effect_ids: Vec<String>,
+    /// Their identifiers.
+    pub effect_ids: Vec<Arc<EffectId>>,
 }
 
 /// The prior standard deviation from which its estimation starts, in physical sizes.
@@ -155,17 +145,17 @@ impl Parameters {
     pub fn declared(session: &Session, tests: &[Test], models: &[TestModel]) -> Result<Parameters, Diagnostic> {
         let mut parameters = Parameters { contributions: vec![Vec::new(); tests.len()], ..Parameters::default() };
         for name in &session.unknowns {
-            let id = name.to_string();
             let Some(slot) = session.machine.error_slot(name) else {
-                return Err(error::no_axis(&session.machine, format!("`{id}`: "), &name.axis));
+                return Err(error::no_axis(&session.machine, format!("`{name}`: "), &name.axis));
             };
             let unit = name.freedom.unit();
             let index = parameters.push(Parameter {
-                id,
+                id: ParameterId::Error(name.clone()),
                 unit: unit.displayed().into(),
                 size: physical_size(unit),
                 prior: Prior::Free,
-                role: Role::Error,
+                effect: None,
+                index: 0,
                 found: 0.0,
             })?;
             for (test, model) in models.iter().enumerate() {
@@ -180,10 +170,7 @@ impl Parameters {
                 if prior == Prior::Known {
                     continue;
                 }
-                let group = test.group(unknown.shared_by);
-                let dot = if unknown.coordinate.is_empty() { "" } else { "." };
-                let bracket = if group.is_empty() { String::new() } else { format!("[{group}]") };
-                let id = format!("{}{dot}{}{bracket}", unknown.thing, unknown.coordinate);
+                let id = unknown.id(test.group(unknown.shared_by));
                 let index = match parameters.list.iter().position(|p| p.id == id) {
                     Some(index) => {
                         // Tests that share a component state its prior once. The smallest standard uncertainty holds.
@@ -196,7 +183,8 @@ impl Parameters {
                         unit: unknown.unit.displayed().into(),
                         size: physical_size(unknown.unit),
                         prior,
-                        role: Role::Setup,
+                        effect: None,
+                        index: 0,
                         found: found_before_fit(session, test, component),
                     })?,
                 };
@@ -251,10 +239,7 @@ impl Parameters {
             return Err(error::repeated_unknown(effect.id()));
         }
         let earlier = self.effects.iter().filter(|other| other.id() == effect.id()).count();
-        let id = match earlier {
-            0 => effect.id(),
-            _ => format!("{}#{}", effect.id(), earlier + 1),
-        };
+        let id = Arc::new(EffectId::of(effect, earlier + 1));
         let mut largest = vec![0.0_f64; effect.shape.coefficients()];
         for (position, (test, model)) in tests.iter().zip(models).enumerate() {
             let Some(basis) = BasisOverTest::of(session, test, model, reference, effect)? else { continue };
@@ -263,25 +248,26 @@ impl Parameters {
             }
             self.contributions[position].extend(basis.contributions(first));
         }
-        let dot = |name: &str| if name.is_empty() { "" } else { "." };
         for (k, name) in effect.shape.coefficient_names().into_iter().enumerate() {
             self.push(Parameter {
-                id: format!("{id}{}{name}", dot(&name)),
+                id: ParameterId::Effect(Arc::clone(&id), Part::Coefficient(name)),
                 unit: ParameterUnit::of_effect(session, effect, k),
                 size: if largest[k] > 0.0 { size / largest[k] } else { size },
                 prior,
-                role: Role::Coefficient { effect: number, coefficient: k },
+                effect: Some(number),
+                index: k,
                 found: 0.0,
             })?;
         }
         for which in &effect.estimated {
             let width = effect.width_of_number(*which);
             self.push(Parameter {
-                id: format!("{id}.{}", effect.shape.number_names()[*which]),
+                id: ParameterId::Effect(Arc::clone(&id), Part::Number(effect.shape.number_names()[*which].to_string())),
                 unit: ParameterUnit::of_number(session, effect),
                 size: width,
                 prior: Prior::Gaussian(width),
-                role: Role::Number { effect: number, number: *which },
+                effect: Some(number),
+                index: *which,
                 found: 0.0,
             })?;
         }
@@ -293,9 +279,8 @@ impl Parameters {
     /// The same parameters without the coefficients of families whose prior scale is estimated, and the index of each
     /// remaining parameter among all. The contributions of the effects are removed, the list of effects is not.
     pub(crate) fn without_families(&self) -> (Parameters, Vec<usize>) {
-        let of_family = |parameter: &Parameter| match parameter.role {
-            Role::Coefficient { effect, .. } => self.effects[effect].family().is_some(),
-            Role::Error | Role::Setup | Role::Number { .. } => false,
+        let of_family = |parameter: &Parameter| {
+            parameter.coefficient_of().is_some_and(|effect| self.effects[effect].family().is_some())
         };
         let kept: Vec<usize> = (0..self.list.len()).filter(|j| !of_family(&self.list[*j])).collect();
         let contribution = |contribution: &SlotContribution| {
@@ -325,18 +310,6 @@ impl Parameters {
         estimated.flat_map(|(number, effect)| (0..effect.shape.positions().len()).map(move |step| (number, step)))
     }
 
-    /// The identifier of a position in results: `EXX~X:steps.at2`.
-    pub(crate) fn position_id(&self, effect: usize, step: usize) -> String {
-        let several = self.effects[effect].shape.positions().len() > 1;
-        let number = if several { (step + 1).to_string() } else { String::new() };
-        format!("{}.at{number}", self.effect_ids[effect])
-    }
-
-    /// Whether an identifier of a result is that of an estimated position.
-    pub(crate) fn is_position(&self, id: &str) -> bool {
-        self.positions().any(|(effect, step)| self.position_id(effect, step) == id)
-    }
-
     /// The values of the driver of an effect at the readings of the tests in which it acts, ascending, each once.
     ///
     /// # Errors
@@ -361,9 +334,9 @@ impl Parameters {
     /// The value of a parameter at the parameters `beta`, internal units: a number of a shape is stated itself, not as its
     /// change; a coordinate of a point of the set-up counts from the stated one, not from where it was found.
     pub fn value(&self, parameter: usize, beta: &[f64]) -> f64 {
-        match self.list[parameter].role {
-            Role::Number { effect, number } => self.effects[effect].shape.number(number) + beta[parameter],
-            Role::Error | Role::Setup | Role::Coefficient { .. } => self.list[parameter].found + beta[parameter],
+        match self.list[parameter].number_of() {
+            Some(effect) => self.effects[effect].shape.number(self.list[parameter].index) + beta[parameter],
+            None => self.list[parameter].found + beta[parameter],
         }
     }
 
@@ -388,11 +361,7 @@ impl Parameters {
             if self.effects[index].estimated.is_empty() && !self.effects[index].positions_estimated {
                 continue;
             }
-            let own = |role: Role| match role {
-                Role::Coefficient { effect, .. } | Role::Number { effect, .. } => effect == index,
-                Role::Error | Role::Setup => false,
-            };
-            let places: Vec<usize> = (0..self.list.len()).filter(|j| own(self.list[*j].role)).collect();
+            let places: Vec<usize> = (0..self.list.len()).filter(|j| self.list[*j].effect == Some(index)).collect();
             let count = self.effects[index].shape.coefficients();
             let (coefficients, numbers) = places.split_at(count);
             let mut effect = self.effects[index].clone();

@@ -31,7 +31,7 @@ use crate::heldout::folds::Folds;
 use crate::noise::Noise;
 use crate::numerics::parallel;
 use crate::numerics::triangle::BLOCK_ROWS;
-use crate::parameters::{Parameters, Role, TestParameters};
+use crate::parameters::{Parameters, TestParameters};
 use abbe_model::driver::Reference;
 
 /// A session with readings, its parameters, and the weights of its readings.
@@ -229,10 +229,10 @@ impl Problem {
     /// Limits the changes of estimated numbers to what their shapes permit and to a factor of [`MAX_FACTOR_OF_NUMBER`].
     pub(crate) fn bound_numbers(&self, beta: &mut [f64]) {
         for (parameter, change) in self.parameters.list.iter().zip(beta) {
-            let Role::Number { effect, number } = parameter.role else { continue };
+            let Some(effect) = parameter.number_of() else { continue };
             let shape = &self.parameters.effects[effect].shape;
-            let present = shape.number(number);
-            let is_valid = |change: f64| shape.with_number(number, present + change).check().is_ok();
+            let present = shape.number(parameter.index);
+            let is_valid = |change: f64| shape.with_number(parameter.index, present + change).check().is_ok();
             if !is_valid(-2.0 * present.abs()) {
                 let [low, high] = [1.0 / MAX_FACTOR_OF_NUMBER, MAX_FACTOR_OF_NUMBER].map(|factor| factor * present);
                 *change = change.clamp(low - present, high - present);
@@ -242,12 +242,11 @@ impl Problem {
 
     /// Whether the shapes can have their numbers with these changes.
     pub(crate) fn has_valid_numbers(&self, beta: &[f64]) -> bool {
-        self.parameters.list.iter().zip(beta).all(|(parameter, change)| match parameter.role {
-            Role::Number { effect, number } => {
-                let shape = &self.parameters.effects[effect].shape;
+        self.parameters.list.iter().zip(beta).all(|(parameter, change)| {
+            parameter.number_of().is_none_or(|effect| {
+                let (shape, number) = (&self.parameters.effects[effect].shape, parameter.index);
                 shape.with_number(number, shape.number(number) + change).check().is_ok()
-            }
-            Role::Error | Role::Setup | Role::Coefficient { .. } => true,
+            })
         })
     }
 

@@ -14,6 +14,7 @@ mod refit;
 use statrs::distribution::{Continuous, Normal};
 
 use abbe_model::Diagnostic;
+use abbe_model::parameter_id::ParameterId;
 use abbe_model::words::counted;
 
 use crate::error;
@@ -58,7 +59,7 @@ pub fn add_monte_carlo(
     // The draws are those of the noise, with a linear model. What uncertainties cover beside it, aliases, positions of steps and
     // numbers of shapes, is added.
     let of_noise = fit::parameters_of_noise(problem, fit);
-    let is_drawn = |parameter: &Estimate| !problem.parameters.is_position(&parameter.id);
+    let is_drawn = |parameter: &Estimate| !parameter.is(ParameterId::is_position);
     let parameters: Vec<DrawnParameter> = of_noise
         .iter()
         .filter(|parameter| is_drawn(parameter))
@@ -150,7 +151,6 @@ mod tests {
 
     use super::*;
     use crate::fit::{AliasChange, EffectAliases};
-    use crate::parameters::Role;
 
     const FACTOR: f64 = 1.959_964;
 
@@ -203,7 +203,7 @@ mod tests {
         problem.add_effect(&Effect::new(Component::parse("EZC").unwrap(), Driver::parse("C"), shape)).unwrap();
         let mut fit = fit::fit(&problem, None).unwrap();
         // An alias that changes every location error by twice its uncertainty from the noise.
-        let is_location = |j: usize| problem.parameters.list[j].role == Role::Error;
+        let is_location = |j: usize| problem.parameters.list[j].id.is_error();
         let of_noise = |j: usize| fit.covariance[(j, j)].sqrt() * fit.u_enlargement;
         let change = |j: usize| if is_location(j) { 2.0 * of_noise(j) } else { 0.0 };
         let alias = AliasChange { alias: 0, changes: (0..fit.beta.len()).map(change).collect(), delta_chi2: 0.0 };
@@ -223,6 +223,6 @@ mod tests {
             assert!((before.u / without - 5_f64.sqrt()).abs() < 1e-9, "{}", before.id);
             assert!((drawn.gum_u / without - 1.0).abs() < 1e-12, "{}: {} and {without}", before.id, drawn.gum_u);
         }
-        assert_eq!(covering, problem.parameters.list.iter().filter(|parameter| parameter.role == Role::Error).count());
+        assert_eq!(covering, problem.parameters.list.iter().filter(|parameter| parameter.id.is_error()).count());
     }
 }

@@ -13,13 +13,13 @@
 use std::collections::BTreeSet;
 
 use abbe_model::Diagnostic;
+use abbe_model::parameter_id::ParameterId;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::error;
 use crate::fit::{Fit, parameters};
 use crate::numerics::tails::{chi_square_tails, normal_tail};
-use crate::parameters::Role;
 use crate::problem::Problem;
 use crate::results::Estimate;
 
@@ -40,8 +40,6 @@ pub struct Session {
 impl Session {
     /// A fitted session with the name of its file.
     pub fn new(name: &str, problem: &Problem, fit: &Fit) -> Session {
-        let list = &problem.parameters.list;
-        let setup = |id: &str| list.iter().any(|p| p.id == id && p.role == Role::Setup);
         let tests: Vec<&str> = problem.tests.iter().map(|test| test.name.as_str()).collect();
         Session {
             name: name.to_string(),
@@ -51,7 +49,7 @@ impl Session {
                 problem.session.machine.code(),
                 tests.join(", ")
             ),
-            parameters: parameters(problem, fit).into_iter().filter(|parameter| !setup(&parameter.id)).collect(),
+            parameters: parameters(problem, fit).into_iter().filter(|own| !own.is(ParameterId::is_setup)).collect(),
         }
     }
 }

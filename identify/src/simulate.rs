@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use abbe_model::Diagnostic;
-use abbe_model::component::ErrorName;
+use abbe_model::parameter_id::{ParameterId, Part};
 use abbe_model::sensitivity::TestModel;
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Prior, Session, planned};
@@ -20,7 +20,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::error;
-use crate::parameters::{Parameters, Role};
+use crate::parameters::Parameters;
 use crate::quantity::Given;
 
 /// The values and options of a simulation.
@@ -128,14 +128,16 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
     let mut given = Vec::with_capacity(simulation.given.len());
     let mut open = with_free_setups(session, planned);
     for value in &simulation.given {
-        let id = result_id(&open, &value.id)?;
-        if given.iter().any(|(known, _): &(String, &Given)| *known == id) {
+        let id = parameter_id(&open, &value.id)?;
+        let is_same =
+            |(known, other): &(Option<ParameterId>, &Given)| *known == id && (id.is_some() || other.id == value.id);
+        if given.iter().any(is_same) {
             return Err(error::repeated_unknown(&value.id));
         }
-        if let Some(name) = ErrorName::parse(&id)
-            && !open.unknowns.contains(&name)
+        if let Some(name) = id.as_ref().and_then(ParameterId::error)
+            && !open.unknowns.contains(name)
         {
-            open.unknowns.push(name);
+            open.unknowns.push(name.clone());
         }
         given.push((id, value));
     }
@@ -159,9 +161,10 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
         let stated = Parameters::declared(session, &session.tests, &models)?;
         let mut random = Pcg64::new(u128::from(simulation.seed), SETUP_STREAM);
         for parameter in &stated.list {
-            let (Role::Setup, Prior::Gaussian(u)) = (parameter.role, parameter.prior) else {
+            let Prior::Gaussian(u) = parameter.prior else { continue };
+            if !parameter.id.is_setup() {
                 continue;
-            };
+            }
             let normal: f64 = StandardNormal.sample(&mut random);
             if let Some(place) = parameters.list.iter().position(|other| other.id == parameter.id) {
                 beta[place] = u * normal;
@@ -207,7 +210,7 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
         .filter(|(_, value)| **value != 0.0)
         .map(|(parameter, value)| {
             let unit = &parameter.unit;
-            Given { id: parameter.id.clone(), value: value * unit.display_per_internal, unit: unit.name.clone() }
+            Given { id: parameter.id.to_string(), value: value * unit.display_per_internal, unit: unit.name.clone() }
         })
         .collect();
     Ok(Simulated { readings, truth, noise_mm, noise_rad, warnings })
@@ -239,10 +242,11 @@ fn with_free_setups(session: &Session, planned: Vec<Readings>) -> Session {
     open
 }
 
-/// The identifier in results: errors of axes by ISO 230-1.
-fn result_id(session: &Session, id: &str) -> Result<String, Diagnostic> {
-    let Some(mut name) = ErrorName::parse(id) else {
-        return Ok(id.to_string());
+/// The parameter of this name, an error with the name of its axis as the machine writes it; `None` if the text names none.
+fn parameter_id(session: &Session, id: &str) -> Result<Option<ParameterId>, Diagnostic> {
+    let mut name = match id.parse::<ParameterId>() {
+        Ok(ParameterId::Error(name)) => name,
+        other => return Ok(other.ok()),
     };
     let machine = &session.machine;
     let lower = name.axis.to_lowercase();
@@ -253,21 +257,26 @@ fn result_id(session: &Session, id: &str) -> Result<String, Diagnostic> {
         return Err(error::no_axis(machine, format!("`{id}`: "), &name.axis));
     };
     name.axis.clone_from(&machine.axes[axis].name);
-    Ok(name.to_string())
+    Ok(Some(ParameterId::Error(name)))
 }
 
 /// Writes the given values to the parameters. Amplitude and phase of a harmonic become cosine and sine,
 /// `A·cos(nq + φ) = A cos φ · cos nq − A sin φ · sin nq`.
-fn assign(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64]) -> Result<(), Diagnostic> {
-    let find = |id: &str| parameters.list.iter().position(|parameter| parameter.id == id);
+fn assign(
+    parameters: &Parameters,
+    given: &[(Option<ParameterId>, &Given)],
+    beta: &mut [f64],
+) -> Result<(), Diagnostic> {
+    let find = |id: &ParameterId| parameters.list.iter().position(|parameter| parameter.id == *id);
     let mut used = vec![false; given.len()];
-    for effect in &parameters.effects {
+    for (effect, id) in parameters.effects.iter().zip(&parameters.effect_ids) {
         if !effect.shape.is_wave() {
             continue;
         }
-        let id = effect.id();
-        let part = |name: &str| given.iter().position(|(known, _)| *known == format!("{id}.{name}"));
-        let (amplitude, phase) = (part("amplitude"), part("phase"));
+        let own = |part: Part| ParameterId::Effect(Arc::clone(id), part);
+        let [cos, sin] = ["cos", "sin"].map(|name| own(Part::Coefficient(name.to_string())));
+        let place = |id: &ParameterId| given.iter().position(|(known, _)| known.as_ref() == Some(id));
+        let (amplitude, phase) = (place(&own(Part::Amplitude)), place(&own(Part::Phase)));
         let Some(amplitude) = amplitude else {
             if phase.is_some() {
                 return Err(error::missing(
@@ -278,14 +287,14 @@ fn assign(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64])
             }
             continue;
         };
-        if part("cos").is_some() || part("sin").is_some() {
+        if place(&cos).is_some() || place(&sin).is_some() {
             return Err(error::contradictory(
                 format!("`{id}.amplitude`"),
                 format!("`{id}.cos` or `{id}.sin`"),
                 "give one or the other",
             ));
         }
-        let Some(cosine) = find(&format!("{id}.cos")) else {
+        let Some(cosine) = find(&cos) else {
             continue;
         };
         used[amplitude] = true;
@@ -304,7 +313,7 @@ fn assign(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64])
         if used {
             continue;
         }
-        let Some(index) = find(id) else {
+        let Some(index) = id.as_ref().and_then(find) else {
             return Err(unknown_identifier(parameters, &value.id));
         };
         beta[index] = value.inside(&parameters.list[index].unit)?;
@@ -315,12 +324,9 @@ fn assign(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64])
 /// The error for an identifier that the session lacks, with those that it has.
 fn unknown_identifier(parameters: &Parameters, id: &str) -> Diagnostic {
     let of_role = |coefficients: bool| {
-        let chosen = parameters.list.iter().filter(|parameter| match parameter.role {
-            Role::Coefficient { .. } => coefficients,
-            Role::Setup => !coefficients,
-            Role::Error | Role::Number { .. } => false,
-        });
-        chosen.map(|parameter| parameter.id.as_str()).collect::<Vec<_>>()
+        let ids = parameters.list.iter().map(|parameter| &parameter.id);
+        let chosen = ids.filter(|id| if coefficients { id.is_coefficient() } else { id.is_setup() });
+        chosen.map(ToString::to_string).collect::<Vec<_>>()
     };
     let of_effect = id.contains('~');
     let these = match of_effect {
@@ -340,10 +346,7 @@ fn warnings(parameters: &Parameters, beta: &[f64]) -> Vec<String> {
         }
     }
     for (number, effect) in parameters.effects.iter().enumerate() {
-        let own =
-            parameters.list.iter().zip(beta).filter(
-                |(parameter, _)| matches!(parameter.role, Role::Coefficient { effect, .. } if effect == number),
-            );
+        let own = parameters.list.iter().zip(beta).filter(|(parameter, _)| parameter.coefficient_of() == Some(number));
         if own.into_iter().all(|(_, value)| *value == 0.0) {
             warnings.push(format!(
                 "the declared effect `{}` has no given value: it is zero in these readings",

@@ -16,11 +16,11 @@ use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
 use abbe_model::instrument::Contact;
+use abbe_model::parameter_id::ParameterId;
 use abbe_model::unit::Unit;
 
 use crate::fit::doubt_on_unit;
 use crate::linear::is_of_interest;
-use crate::parameters::Role;
 use crate::plausibility::{Conflict, ConflictKind, Plausibility, likely_unit};
 use crate::problem::Problem;
 use crate::results::validation::{MovedParameter, ValidationResult, ValidationVerdict};
@@ -273,9 +273,9 @@ fn zero_terms(axis: &Axis, nearest: usize) -> Terms {
 /// of each effect, constant errors, shifts of a rotary axis along itself.
 fn further(problem: &Problem, parameters: &[Estimate]) -> Vec<Estimate> {
     let machine = &problem.session.machine;
-    let is_of_line = |id: &str| {
-        let Some(name) = ErrorName::parse(id).filter(|name| name.kind == ErrorKind::Location) else { return false };
-        machine.axes.iter().find(|axis| axis.name == name.axis).is_some_and(|axis| {
+    let is_of_line = |name: &ErrorName| {
+        let axis = machine.axes.iter().find(|axis| axis.name == name.axis && name.kind == ErrorKind::Location);
+        axis.is_some_and(|axis| {
             let share = axis.direction[name.freedom.index() % 3].abs();
             match (axis.kind, name.freedom.is_angle()) {
                 (AxisKind::Rotary, true) => true,
@@ -286,26 +286,18 @@ fn further(problem: &Problem, parameters: &[Estimate]) -> Vec<Estimate> {
         })
     };
     let ratio = |found: &Estimate| (found.value / found.u).abs();
-    let mut list: Vec<(Option<usize>, Estimate)> = Vec::new();
-    // The phase of an amplitude and the numbers of a shape are no sizes.
-    for found in parameters.iter().filter(|found| found.exceeds_u() && !found.id.ends_with(".phase")) {
-        // The order of another effect may continue an identifier: `EZC~C:h2` and `EZC~C:h2.5`.
-        let ids = problem.parameters.effect_ids.iter().enumerate().filter(|(_, id)| {
-            let rest = found.id.strip_prefix(id.as_str());
-            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
-        });
-        let effect = ids.max_by_key(|(_, id)| id.len()).map(|(number, _)| number);
-        let same = problem.parameters.list.iter().find(|parameter| parameter.id == found.id);
-        let is_number = same.is_some_and(|parameter| matches!(parameter.role, Role::Number { .. }));
-        if is_number || problem.parameters.is_position(&found.id) {
+    let mut list: Vec<(ParameterId, Estimate)> = Vec::new();
+    for found in parameters.iter().filter(|found| found.exceeds_u()) {
+        let Ok(id) = found.id.parse::<ParameterId>() else { continue };
+        // The phase of an amplitude and the numbers of a shape are no sizes.
+        if id.is_phase() || id.is_number() || id.is_position() {
             continue;
         }
-        let is_setup = same.is_some_and(|parameter| parameter.role == Role::Setup);
-        match list.iter_mut().find(|(other, _)| effect.is_some() && *other == effect) {
+        match list.iter_mut().find(|(other, _)| id.effect().is_some() && other.effect() == id.effect()) {
             Some((_, other)) if ratio(found) > ratio(other) => *other = found.clone(),
             Some(_) => {}
-            None if effect.is_none() && (is_setup || is_of_line(&found.id)) => {}
-            None => list.push((effect, found.clone())),
+            None if id.is_setup() || id.error().is_some_and(is_of_line) => {}
+            None => list.push((id, found.clone())),
         }
     }
     list.into_iter().map(|(_, found)| found).collect()
@@ -320,20 +312,22 @@ fn correction(
     (parameters, covariance): (&[Estimate], &Covariance),
 ) -> Option<AxisCorrection> {
     // Index and change of the component in mm or 1 per unit of the parameter.
+    let place = |name: &ErrorName| {
+        let id = name.to_string();
+        parameters.iter().position(|parameter| parameter.id == id)
+    };
     let own: Vec<(usize, f64)> = (terms.iter())
         .filter_map(|(name, by)| {
-            let id = name.to_string();
-            let place = parameters.iter().position(|parameter| parameter.id == id)?;
             let internal = by / name.freedom.unit().displayed().per_internal();
-            Some((place, internal))
+            Some((place(name)?, internal))
         })
         .collect();
     // An error of the axis itself has to be identified; of a zero, the one along the axis.
-    let is_own = |place: usize| match (quantity, terms.first()) {
-        (LineQuantity::Zero, Some((name, _))) => parameters[place].id == name.to_string(),
-        _ => parameters[place].id.ends_with(&format!("0{axis}")),
+    let is_own = |name: &ErrorName| match (quantity, terms.first()) {
+        (LineQuantity::Zero, Some((first, _))) => name == first,
+        _ => name.axis == axis && name.kind == ErrorKind::Location,
     };
-    if !own.iter().any(|(place, _)| is_own(*place)) {
+    if !terms.iter().any(|(name, _)| is_own(name) && place(name).is_some()) {
         return None;
     }
     let is_angle = terms.first().is_some_and(|(name, _)| name.freedom.is_angle());

@@ -85,7 +85,7 @@ fn analyse_problem(problem: &Problem, travel_mm: f64) -> Result<PlanAnalysis, Di
             let unit = &list[j].unit;
             let u = linear.u(j);
             ErrorAnalysis {
-                id: list[j].id.clone(),
+                id: list[j].id.to_string(),
                 meaning: parameter_meaning(problem, j, None),
                 unit: unit.name.clone(),
                 u: u.map(|u| u * unit.display_per_internal),
@@ -157,7 +157,7 @@ fn summary(problem: &Problem, number: usize) -> TestSummary {
 fn correlation(problem: &Problem, linear: &Linearisation, of_interest: &[usize]) -> Correlation {
     let both_identifiable = |i: usize, j: usize| linear.rank.is_identifiable(i) && linear.rank.is_identifiable(j);
     Correlation {
-        ids: of_interest.iter().map(|j| problem.parameters.list[*j].id.clone()).collect(),
+        ids: of_interest.iter().map(|j| problem.parameters.list[*j].id.to_string()).collect(),
         matrix: of_interest
             .iter()
             .map(|&i| {
@@ -186,7 +186,7 @@ fn leave_one_out(
                 .filter(|j| linear.rank.is_identifiable(**j))
                 .map(|&j| {
                     let grown = covariance[(j, j)] / linear.covariance[(j, j)];
-                    VarianceInflation { id: list[j].id.clone(), factor: rank.is_identifiable(j).then_some(grown) }
+                    VarianceInflation { id: list[j].id.to_string(), factor: rank.is_identifiable(j).then_some(grown) }
                 })
                 .collect();
             let all: Vec<&str> = variance_inflation

@@ -11,6 +11,7 @@
 //! Non-identifiable combinations keep their nominal value, as in a fit.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use abbe_identify::error;
 use abbe_identify::linear::{Linearisation, is_of_interest};
@@ -21,6 +22,7 @@ use abbe_model::Diagnostic;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::effect::shape::Harmonic;
 use abbe_model::effect::{Component, Effect, Shape};
+use abbe_model::parameter_id::{EffectId, ParameterId, Part};
 use abbe_trace::candidates::columns::Columns;
 use abbe_trace::candidates::library;
 use faer::Mat;
@@ -139,6 +141,7 @@ pub fn bias_table(problem: &Problem, effects: &[Effect]) -> Result<BiasTable, Di
         columns.fill(&[&set], changes.as_mut());
         let moved = &linear.covariance * (jacobian.transpose() * &changes);
         let remaining = &changes - jacobian * &moved;
+        let id = Arc::new(EffectId::of(effect, 1));
         for (k, name) in effect.shape.coefficient_names().into_iter().enumerate() {
             let unit = ParameterUnit::of_effect(&problem.session, effect, k);
             let rms_um =
@@ -148,10 +151,9 @@ pub fn bias_table(problem: &Problem, effects: &[Effect]) -> Result<BiasTable, Di
                 continue;
             }
             let bias = |j: &usize| moved[(*j, k)] * list[*j].unit.display_per_internal / unit.display_per_internal;
-            let dot = if name.is_empty() { "" } else { "." };
             rows.push(BiasRow {
                 effect: effect.id(),
-                id: format!("{}{dot}{name}", effect.id()),
+                id: ParameterId::Effect(Arc::clone(&id), Part::Coefficient(name)).to_string(),
                 bias: errors.iter().map(bias).collect(),
                 signal_um,
                 residual_um: rms_um(remaining.col(k)),
@@ -162,7 +164,7 @@ pub fn bias_table(problem: &Problem, effects: &[Effect]) -> Result<BiasTable, Di
     let most = rows.iter().map(BiasRow::largest).fold(0.0, f64::max);
     let rounding = |value: &mut f64| *value = if value.abs() < ROUNDING_SHARE * most { 0.0 } else { *value };
     rows.iter_mut().flat_map(|row| &mut row.bias).for_each(rounding);
-    let errors = errors.iter().map(|j| BiasedError { id: list[*j].id.clone(), unit: list[*j].unit.name.clone() });
+    let errors = errors.iter().map(|j| BiasedError { id: list[*j].id.to_string(), unit: list[*j].unit.name.clone() });
     Ok(BiasTable { errors: errors.collect(), rows })
 }
 

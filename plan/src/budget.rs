@@ -35,7 +35,7 @@ pub fn budget(problem: &Problem, linear: &Linearisation, error: usize) -> Vec<Co
     for (s, parameter) in list.iter().enumerate() {
         let Some(u) = prior_u(parameter) else { continue };
         let part = (covariance[(error, s)] / u).powi(2);
-        parts.push(Contribution { source: parameter.id.clone(), u: part.sqrt() * scale, share: part / variance });
+        parts.push(Contribution { source: parameter.id.to_string(), u: part.sqrt() * scale, share: part / variance });
     }
     let noise = noise_variance(linear, error);
     parts.push(Contribution {
@@ -66,7 +66,7 @@ pub fn correlated_with(problem: &Problem, linear: &Linearisation, error: usize) 
             *other != error && is_of_interest(parameter) && linear.rank.is_identifiable(*other)
         })
         .map(|(other, parameter)| CorrelatedWith {
-            id: parameter.id.clone(),
+            id: parameter.id.to_string(),
             correlation: correlation(&linear.covariance, error, other),
         })
         .filter(|shared| shared.correlation.abs() >= MIN_CORRELATION)

@@ -7,10 +7,11 @@ use super::test_variations::TestVariations;
 use abbe_identify::linear::Linearisation;
 use abbe_identify::numerics::parallel;
 use abbe_identify::numerics::triangle::Triangle;
-use abbe_identify::parameters::{Parameter, Role};
+use abbe_identify::parameters::Parameter;
 use abbe_identify::problem::Problem;
 use abbe_model::Diagnostic;
 use abbe_model::instrument::{Contact, SharedBy};
+use abbe_model::parameter_id::ParameterId;
 use abbe_model::session::Test;
 
 /// The information of every candidate test on the shared parameters.
@@ -70,32 +71,21 @@ impl PreparedCandidates {
 /// Whether a new test can share a parameter: errors and effects, what stands on the table or beside the machine, what is
 /// mounted at the tool in the last test, what all tests share.
 fn may_be_shared(problem: &Problem, parameter: &Parameter) -> bool {
-    if parameter.role != Role::Setup {
-        return true;
-    }
-    let last = problem.tests.last();
-    match shared_by(problem.tests.iter(), &parameter.id) {
+    let ParameterId::Setup { thing, group, .. } = &parameter.id else { return true };
+    match shared_by(problem.tests.iter(), thing) {
         Some(SharedBy::Setup | SharedBy::Session) => true,
-        Some(SharedBy::SpindleSetup) => {
-            last.is_some_and(|last| parameter.id.ends_with(&bracketed(&last.spindle_setup)))
-        }
-        _ => !parameter.id.contains('['),
+        Some(SharedBy::SpindleSetup) => problem.tests.last().is_some_and(|last| *group == last.spindle_setup),
+        _ => group.is_empty(),
     }
 }
 
-/// What shares a set-up parameter, by the instruments of these tests: that of the sensors is the mount of their body.
-fn shared_by<'t>(mut tests: impl Iterator<Item = &'t Test>, id: &str) -> Option<SharedBy> {
-    let thing = id.split(['.', '[']).next().unwrap_or_default();
+/// What shares an object of the set-up, by the instruments of these tests: that of the sensors is the mount of their body.
+fn shared_by<'t>(mut tests: impl Iterator<Item = &'t Test>, thing: &str) -> Option<SharedBy> {
     tests.find_map(|test| {
         let unknowns = test.station.kind().unknowns();
         let found = unknowns.iter().find(|unknown| unknown.thing == thing)?.shared_by;
         Some(if found == SharedBy::Sensors { test.station.sensors() } else { found })
     })
-}
-
-/// The group of a parameter as its identifier has it.
-fn bracketed(group: &str) -> String {
-    format!("[{group}]")
 }
 
 /// The information of a candidate test with a newly mounted spindle ball and, if permitted, with the spindle ball that
@@ -129,11 +119,12 @@ fn ready(
             && last.station.tool_point_mm() == candidate.test.station.tool_point_mm()
     });
     if let Some(last) = last {
-        let [own, mounted_setup] = [&candidate.test.spindle_setup, &last.spindle_setup].map(|setup| bracketed(setup));
-        let is_of_tool = |id: &str| shared_by(alone.tests.iter(), id) == Some(SharedBy::SpindleSetup);
-        let root = shared.root_of_test(&alone, r.as_ref(), |id| match id.strip_suffix(&own) {
-            Some(id_stem) if is_of_tool(id) => format!("{id_stem}{mounted_setup}"),
-            _ => id.to_string(),
+        let is_of_tool = |thing: &str| shared_by(alone.tests.iter(), thing) == Some(SharedBy::SpindleSetup);
+        let root = shared.root_of_test(&alone, r.as_ref(), |id| match id {
+            ParameterId::Setup { thing, group, .. } if *group == candidate.test.spindle_setup && is_of_tool(thing) => {
+                id.clone().with_group(&last.spindle_setup)
+            }
+            _ => id.clone(),
         });
         let mut candidate = candidate.clone();
         candidate.test.spindle_setup = last.spindle_setup.clone();
@@ -141,7 +132,7 @@ fn ready(
         candidate.name.push_str(&format!(", {mounted} left mounted as in {}", last.name));
         ready.push(CandidateInformation { test: candidate, root });
     }
-    let root = shared.root_of_test(&alone, r.as_ref(), str::to_string);
+    let root = shared.root_of_test(&alone, r.as_ref(), Clone::clone);
     ready.insert(0, CandidateInformation { test: candidate.clone(), root });
     Ok(ready)
 }

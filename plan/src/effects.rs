@@ -204,7 +204,7 @@ fn biases(problem: &Problem, moved: MatRef<'_, f64>, unit: &ParameterUnit) -> Ve
                 count => (0..count).map(|k| moved[(j, k)].powi(2)).sum::<f64>().sqrt(),
             };
             Bias {
-                id: parameter.id.clone(),
+                id: parameter.id.to_string(),
                 per_unit: worst * parameter.unit.display_per_internal / unit.display_per_internal,
                 unit: per(&parameter.unit.name, &unit.name),
             }

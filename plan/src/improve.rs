@@ -4,6 +4,7 @@ use abbe_identify::error;
 use abbe_model::Diagnostic;
 use abbe_model::document::print::Block;
 use abbe_model::document::test::Test as Document;
+use abbe_model::parameter_id::ParameterId;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -194,12 +195,12 @@ pub fn improve(
         }
         ref other => other.value(shared, root),
     };
-    let with_units = |named: Vec<(String, f64)>| -> Vec<NamedUncertainty> {
-        let unit = |id: &str| list.iter().find(|parameter| parameter.id == id);
+    let with_units = |named: Vec<(ParameterId, f64)>| -> Vec<NamedUncertainty> {
+        let unit = |id: &ParameterId| list.iter().find(|parameter| parameter.id == *id);
         (named.into_iter())
             .map(|(id, u)| NamedUncertainty {
                 unit: unit(&id).map_or(String::new(), |parameter| parameter.unit.name.clone()),
-                id,
+                id: id.to_string(),
                 u,
             })
             .collect()
@@ -270,7 +271,7 @@ fn step(
     design: &Design<'_>,
     chosen: &[usize],
     outside: &impl Fn(&Root) -> f64,
-    with_units: &impl Fn(Vec<(String, f64)>) -> Vec<NamedUncertainty>,
+    with_units: &impl Fn(Vec<(ParameterId, f64)>) -> Vec<NamedUncertainty>,
 ) -> ProposedTest {
     let shared = &prepared.shared;
     let candidate = &prepared.candidates[chosen[chosen.len() - 1]].test;
@@ -281,7 +282,7 @@ fn step(
     let (u_before, u_after) = (shared.uncertainties(&before), shared.uncertainties(&root));
     let makes_identifiable = (0..shared.targets)
         .filter(|j| unidentifiable(&u_before, *j) && !unidentifiable(&u_after, *j))
-        .map(|j| shared.ids[first + j].clone())
+        .map(|j| shared.ids[first + j].to_string())
         .collect();
     let bar = candidate.test.station.bar();
     ProposedTest {
@@ -303,7 +304,8 @@ fn step(
 /// regularisation only.
 fn determines_nothing(shared: &SharedParameters, before: &Root, after: &Root) -> bool {
     let (before, after) = (named_uncertainties(shared, before), named_uncertainties(shared, after));
-    let lowered = |((_, before), (_, after)): (&(String, f64), &(String, f64))| *after < (1.0 - MIN_LOWERED) * before;
+    let lowered =
+        |((_, before), (_, after)): (&(ParameterId, f64), &(ParameterId, f64))| *after < (1.0 - MIN_LOWERED) * before;
     after.iter().any(|(_, u)| u.is_infinite()) && !before.iter().zip(&after).any(lowered)
 }
 
@@ -316,7 +318,7 @@ fn is_unidentifiable(shared: &SharedParameters, u: &[f64], j: usize) -> bool {
 
 /// The target parameters with their uncertainties. They are infinite for parameters that [`SharedParameters`]
 /// regularises because they are not identifiable.
-fn named_uncertainties(shared: &SharedParameters, root: &Root) -> Vec<(String, f64)> {
+fn named_uncertainties(shared: &SharedParameters, root: &Root) -> Vec<(ParameterId, f64)> {
     let first = shared.ids.len() - shared.targets;
     let u = shared.uncertainties(root);
     (0..shared.targets)

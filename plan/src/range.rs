@@ -91,7 +91,7 @@ pub fn shrinkages(problem: &Problem) -> Result<Vec<Shrinkage>, Diagnostic> {
             let (middle, half) = (0.5 * (low + high), 0.5 * enough * (high - low));
             shrinkage.minimum_range =
                 Some([(middle - half) * display_per_internal, (middle + half) * display_per_internal].into());
-            shrinkage.first_to_double = Some(problem.parameters.list[parameter].id.clone());
+            shrinkage.first_to_double = Some(problem.parameters.list[parameter].id.to_string());
         }
         found.push(shrinkage);
     }

@@ -20,7 +20,6 @@ use super::test_variations::TestVariations;
 use abbe_identify::numerics::parallel;
 use abbe_identify::numerics::ranking::{rounded, smallest_first};
 use abbe_identify::numerics::triangle::upper;
-use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 
 /// Relative gain below which a test adds no information.
@@ -195,10 +194,7 @@ impl SeparationComparison {
             }
         }
         let place = |effect: &Effect| all.parameters.effects.iter().position(|other| other == effect);
-        let effect_of = |j: usize| match all.parameters.list[j].role {
-            Role::Coefficient { effect, .. } => Some(effect),
-            _ => None,
-        };
+        let effect_of = |j: usize| all.parameters.list[j].coefficient_of();
         let found_at = place(found);
         let targets: Vec<usize> =
             (0..all.parameters.list.len()).filter(|j| effect_of(*j).is_some() && effect_of(*j) == found_at).collect();

@@ -10,7 +10,6 @@ use crate::error::{NO_CANDIDATE_TEST, TOO_MANY};
 use crate::proposal::{self, proposal};
 use crate::separate::{AlternativeSeparation, SeparatingTest, separating_tests};
 use crate::test_variations::TestVariations;
-use abbe_identify::parameters::Role;
 use abbe_identify::results::{AlternativeResult, EffectResult, SeparatingTestResult, SeparationResult};
 use abbe_trace::interrupt::Interrupt;
 use abbe_trace::result::effect_name;
@@ -66,10 +65,9 @@ pub fn separate_aliases(
 /// The tests that separate the `k`-th found effect from its aliases.
 fn tests_for(trace: &TraceOutcome, k: usize, variations: &TestVariations) -> Result<Vec<SeparatingTest>, Diagnostic> {
     let number = trace.before.parameters.effects.len() + k;
-    let is_own = |role: &Role| matches!(role, Role::Coefficient { effect, .. } if *effect == number);
     let parameters = trace.after.parameters.list.iter().zip(&trace.after_fit.beta);
-    let coefficients: Vec<f64> =
-        parameters.filter(|(parameter, _)| is_own(&parameter.role)).map(|(_, value)| *value).collect();
+    let own = parameters.filter(|(parameter, _)| parameter.coefficient_of() == Some(number));
+    let coefficients: Vec<f64> = own.map(|(_, value)| *value).collect();
     let aliases = &trace.alias_effects[k];
     let weighed = &aliases[..aliases.len().min(MAX_COMPARED_TESTS)];
     let beta = &trace.after_fit.beta;

@@ -92,7 +92,7 @@ pub fn structure(problem: &Problem) -> Result<Structure, Diagnostic> {
         rank: linear.rank.identifiable_basis.ncols(),
         singular_values: linear.rank.singular_values.clone(),
         base: base(problem, &linear),
-        held_at_nominal: linear.rank.pivots.iter().map(|pivot| list[*pivot].id.clone()).collect(),
+        held_at_nominal: linear.rank.pivots.iter().map(|pivot| list[*pivot].id.to_string()).collect(),
     })
 }
 
@@ -159,9 +159,10 @@ fn base(problem: &Problem, linear: &Linearisation) -> Vec<BaseParameter> {
                 .iter()
                 .flat_map(|(a, x)| internal.iter().map(move |(b, y)| x * y * linear.covariance[(*a, *b)]))
                 .sum();
-            let terms = internal[1..].iter().map(|(p, share)| (list[*p].id.clone(), share * display(j) / display(*p)));
+            let terms =
+                internal[1..].iter().map(|(p, share)| (list[*p].id.to_string(), share * display(j) / display(*p)));
             BaseParameter {
-                id: list[j].id.clone(),
+                id: list[j].id.to_string(),
                 unit: list[j].unit.name.clone(),
                 terms: terms.collect(),
                 u: variance.max(0.0).sqrt() * display(j),

@@ -76,7 +76,7 @@ impl Model {
         let row = |(j, parameter): (usize, &model_file::ModelParameter)| {
             let scale = parameter.unit.display_per_internal;
             let name = parameter.unit.name.clone();
-            (parameter.id.clone(), parameter.value * scale, self.model.u(j) * scale, name, parameter.held)
+            (parameter.id.to_string(), parameter.value * scale, self.model.u(j) * scale, name, parameter.held)
         };
         parameters.map(row).collect()
     }

@@ -12,13 +12,13 @@ use abbe::identify::noise::{Noise, NoiseSource};
 use abbe::identify::problem::{Problem, RowBlock};
 use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulation, simulate};
-use abbe::model::component::ErrorName;
 use abbe::model::document::edit::SessionText;
 use abbe::model::document::node::Node;
 use abbe::model::document::{of_domain, print};
 use abbe::model::driver::column;
 use abbe::model::effect::Component;
 use abbe::model::instrument::channel::labels;
+use abbe::model::parameter_id::ParameterId;
 use abbe::model::sensitivity::TestModel;
 use abbe::model::session::{self as domain, Prior};
 use abbe::model::unit::{ARCSEC_PER_RAD, Unit};
@@ -228,7 +228,7 @@ impl Session {
                 Prior::Gaussian(u) => Some(u * unit.display_per_internal),
                 Prior::Known | Prior::Free => None,
             };
-            (parameter.id.clone(), unit.name.clone(), prior)
+            (parameter.id.to_string(), unit.name.clone(), prior)
         };
         Ok(problem.parameters.list.iter().map(row).collect())
     }
@@ -393,15 +393,17 @@ fn jacobian(problem: &Problem, beta: &[f64]) -> Result<Vec<f64>, Failed> {
 /// The display unit of a parameter: one of the session, or any error of an axis.
 fn unit_of(state: &State, id: &str) -> Result<String, Failed> {
     let problem = state.problem()?;
+    let known = id.parse::<ParameterId>().ok();
     // Results state harmonics by amplitude and phase.
-    if id.ends_with(".phase") {
+    if known.as_ref().is_some_and(ParameterId::is_phase) {
         return Ok("deg".to_string());
     }
-    let known = id.strip_suffix(".amplitude").map_or(id.to_string(), |effect| format!("{effect}.cos"));
-    if let Some(parameter) = problem.parameters.list.iter().find(|parameter| parameter.id == known) {
+    let estimated = known.as_ref().map(ParameterId::cosine);
+    if let Some(parameter) = problem.parameters.list.iter().find(|parameter| Some(&parameter.id) == estimated.as_ref())
+    {
         return Ok(parameter.unit.name.clone());
     }
-    let component = ErrorName::parse(id).map(Component::Axis);
+    let component = known.as_ref().and_then(ParameterId::error).cloned().map(Component::Axis);
     let unit = component.and_then(|component| component.unit(state.session.instrument.unknowns()));
     unit.map(|unit| unit.displayed().name().to_string()).ok_or_else(|| {
         Failed::argument(

@@ -91,7 +91,7 @@ impl Plan {
         let problem = &self.problem;
         let Some(number) = problem.tests.iter().position(|known| known.name == test) else { return Ok(None) };
         let list = &problem.parameters.list;
-        let of = |id: &str| list.iter().position(|parameter| parameter.id == id);
+        let of = |id: &str| list.iter().position(|parameter| parameter.id.to_string() == id);
         let columns: Vec<Option<usize>> = self.analysis.errors.iter().map(|error| of(&error.id)).collect();
         let values = problem.slot_values(&vec![0.0; list.len()]);
         let mut matrix: Vec<f64> = Vec::new();

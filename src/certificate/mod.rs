@@ -8,12 +8,12 @@ mod write;
 use abbe_files::Source;
 use abbe_files::read::lowered;
 use abbe_identify::error;
-use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::FitResult;
 use abbe_model::Diagnostic;
 use abbe_model::calendar;
 use abbe_model::document::fault::Fault;
+use abbe_model::parameter_id::ParameterId;
 use abbe_model::session::Session;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -348,20 +348,19 @@ impl<'c> Stated<'c> {
         if !result.plausibility.conflicts.is_empty() {
             return refused("the readings contradict the session");
         }
-        let of_role = |id: &str| problem.parameters.list.iter().find(|known| known.id == id).map(|known| known.role);
         let (mut certified, mut coefficients) = (Vec::new(), Vec::new());
         for own in &result.model.parameters {
-            match (of_role(&own.id), write::si_unit(&own.unit)) {
-                (Some(Role::Setup), _) => {}
-                (Some(Role::Error), Some(unit)) if own.u > 0.0 => certified.push((own, unit)),
+            match (own.id.parse::<ParameterId>(), write::si_unit(&own.unit)) {
+                (Ok(ParameterId::Setup { .. }), _) => {}
+                (Ok(ParameterId::Error(_)), Some(unit)) if own.u > 0.0 => certified.push((own, unit)),
                 _ => coefficients.push(own.id.as_str()),
             }
         }
         if certified.is_empty() {
             return refused("the readings determine no error of the machine");
         }
-        let open = result.model.outcome.not_estimated.iter().filter(|own| of_role(&own.id) == Some(Role::Error));
-        let open = open.map(|own| own.id.as_str()).collect();
+        let open = result.model.outcome.not_estimated.iter().map(|own| own.id.as_str());
+        let open = open.filter(|id| id.parse::<ParameterId>().is_ok_and(|id| id.is_error())).collect();
         write::document(&write::Contents {
             session: &problem.session,
             result,

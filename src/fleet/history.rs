@@ -9,6 +9,7 @@ use abbe_apply::history::{HistoryOptions, MachineSessions, SessionValues, analys
 use abbe_identify::results::validation::ValidationVerdict;
 use abbe_identify::results::{Estimate, MeasuredValue, NextStep, Statements};
 use abbe_model::Diagnostic;
+use abbe_model::parameter_id::ParameterId;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -321,7 +322,7 @@ fn longest_increasing(numbers: &[f64]) -> Vec<bool> {
 /// Whether a parameter belongs to the machine, not to the set-up of a test, and has a value without a jump: a phase
 /// has one at a full turn.
 fn is_of_machine(id: &str) -> bool {
-    (id.contains('~') || !id.contains('[')) && !id.ends_with(".phase")
+    !id.parse::<ParameterId>().is_ok_and(|id| id.group().is_some() || id.is_phase())
 }
 
 fn machine_sessions(machine_id: String, sessions: &[Dated]) -> MachineSessions {

@@ -7,7 +7,6 @@ use abbe_identify::fit::Fit;
 use abbe_identify::fit::base::{Gauge, base_parameters};
 use abbe_identify::model_file::InputFile;
 use abbe_identify::numerics::solve::Svd;
-use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::validation::ValidationVerdict;
 use abbe_identify::results::{EffectName, Estimate, ModelResult, TraceVerdict};
@@ -122,13 +121,13 @@ impl BaseRecord {
         };
         let list = &problem.parameters.list;
         let display = |j: usize| list[j].unit.display_per_internal;
-        let of_machine = |j: &usize| list[*j].role != Role::Setup;
+        let of_machine = |j: &usize| !list[*j].id.is_setup();
         let covariance = |i: usize, j: usize| base.covariance[(i, j)] * display(i) * display(j);
         // A parameter without uncertainty is held at nominal in a combination that the readings hardly determine.
         let is_kept = |j: &usize| !base.held.contains(j) && of_machine(j) && covariance(*j, *j) > 0.0;
         let kept: Vec<usize> = (0..list.len()).filter(is_kept).collect();
         Ok(Some(BaseRecord {
-            held: base.held.iter().filter(|j| of_machine(j)).map(|j| list[*j].id.clone()).collect(),
+            held: base.held.iter().filter(|j| of_machine(j)).map(|j| list[*j].id.to_string()).collect(),
             parameters: kept.iter().map(|j| base.estimate(problem, *j)).collect(),
             covariance: kept.iter().map(|i| kept.iter().map(|j| covariance(*i, *j)).collect()).collect(),
         }))

@@ -1,6 +1,7 @@
 //! Effects that a trace has found, each beside its competing explanations.
 
-use abbe::identify::results::{AliasResult, EffectName, EffectResult, SeparatingTestResult, ShapeParameter};
+use abbe::identify::results::{AliasResult, EffectName, EffectResult, Estimate, SeparatingTestResult, ShapeParameter};
+use abbe::model::parameter_id::ParameterId;
 use abbe::model::words::counted;
 use abbe::trace::TraceOutcome;
 use abbe::trace::alias::CompetingEffect;
@@ -70,6 +71,12 @@ fn values(effect: &EffectResult, screened: &str, is_alone: bool) -> Table {
     Table::new(["", ""], rows)
 }
 
+/// The part of an effect that a parameter is.
+fn part(parameter: &Estimate) -> String {
+    let id = parameter.id.parse::<ParameterId>().ok();
+    id.as_ref().and_then(ParameterId::part).map(ToString::to_string).unwrap_or_default()
+}
+
 /// Coefficients with their standard uncertainties, and chosen numbers of the shape.
 pub fn estimate(effect: &EffectResult) -> String {
     if !effect.curve.is_empty() && effect.prior.is_none() {
@@ -77,10 +84,7 @@ pub fn estimate(effect: &EffectResult) -> String {
     }
     let values = effect.parameters.iter().map(|parameter| {
         let (value, u) = value_and_u(parameter.value, parameter.u);
-        // The text after the last dot is the coefficient, unless the component contains the dot:
-        // `spindle_ball.y~time:drift`.
-        let coefficient = parameter.id.rsplit_once('.').map_or("", |(_, coefficient)| coefficient);
-        let coefficient = if coefficient.contains('~') { "" } else { coefficient };
+        let coefficient = part(parameter);
         let separator = if coefficient.ends_with(|c: char| c.is_ascii_digit()) { ":" } else { "" };
         let value = quantity(&format!("{value} ± {u}"), &parameter.unit);
         format!("{coefficient}{separator} {value}").trim().to_string()
@@ -88,8 +92,8 @@ pub fn estimate(effect: &EffectResult) -> String {
     // Estimated numbers are among the parameters, of several positions each with its number.
     let is_fixed = |number: &&ShapeParameter| {
         let name = if number.name == "time constant" { "tau" } else { &number.name };
-        let ends = [format!(".{name}"), format!(".{name}1")];
-        !effect.parameters.iter().any(|parameter| ends.iter().any(|end| parameter.id.ends_with(end)))
+        let names = [name.to_string(), format!("{name}1")];
+        !effect.parameters.iter().any(|parameter| names.contains(&part(parameter)))
     };
     let numbers = effect.shape_parameters.iter().filter(is_fixed).map(shape_number);
     values.chain(numbers).collect::<Vec<_>>().join(", ")

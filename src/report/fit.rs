@@ -10,6 +10,7 @@ use abbe::identify::series::{spectrum, views};
 use abbe::identify::statements::has_candidates;
 use abbe::identify::tolerance::Conformity;
 use abbe::model::Diagnostic;
+use abbe::model::parameter_id::ParameterId;
 use abbe::model::words::counted;
 
 use super::block::{Level, Report, Sentence, Text};
@@ -56,7 +57,7 @@ pub fn report(
     let estimates = Estimates::new(problem, fit, &model.parameters);
     report.section("Values");
     if let Some(drawn) = &result.monte_carlo {
-        report.key(propagations(drawn, |id| estimates.is_setup(id)));
+        report.key(propagations(drawn));
         report.key(agreement_of_propagations(drawn));
     }
     estimates.errors(&mut report, model.outcome.goodness, None);
@@ -143,7 +144,8 @@ pub fn rank(model: &ModelResult) -> String {
 }
 
 /// Both propagations side by side, with the quoted interval; without `--all`, of the parameters that are no set-up.
-fn propagations(drawn: &FitMonteCarlo, is_setup: impl Fn(&str) -> bool) -> Table {
+fn propagations(drawn: &FitMonteCarlo) -> Table {
+    let is_setup = |id: &str| id.parse::<ParameterId>().is_ok_and(|id| id.is_setup());
     let key_rows = (0..drawn.parameters.len()).filter(|k| !is_setup(&drawn.parameters[*k].id)).collect();
     let rows = drawn.parameters.iter().map(|parameter| {
         let [value, gum_u] = Cell::estimate(parameter.value, parameter.gum_u);

@@ -1,10 +1,10 @@
 //! Estimated parameters: errors and effects apart from set-up parameters, with their uncertainties.
 
 use abbe::identify::fit::Fit;
-use abbe::identify::parameters::{Parameter, Role};
 use abbe::identify::plausibility::{Pull, Pulls};
 use abbe::identify::problem::Problem;
 use abbe::identify::results::{DeterminedBy, Estimate, Goodness, MeasuredValue};
+use abbe::model::parameter_id::ParameterId;
 use abbe::model::words::counted;
 
 use super::block::{Report, Text};
@@ -29,22 +29,16 @@ pub struct Estimates<'r> {
     /// Set-up parameters.
     pub setup: Vec<&'r Estimate>,
     /// Pulls of set-up parameters, by their identifiers.
-    pulls: Vec<(&'r str, Pull)>,
+    pulls: Vec<(String, Pull)>,
 }
 
 impl<'r> Estimates<'r> {
     /// Of the results of a fit.
     pub fn new(problem: &'r Problem, fit: &Fit, parameters: &'r [Estimate]) -> Estimates<'r> {
         let list = &problem.parameters.list;
-        let is_setup = |result: &&Estimate| list.iter().any(|p: &Parameter| p.role == Role::Setup && p.id == result.id);
-        let (setup, errors) = parameters.iter().partition(is_setup);
+        let (setup, errors) = parameters.iter().partition(|own| own.is(ParameterId::is_setup));
         let pulls = Pulls::of(problem, fit).each.into_iter();
-        Estimates { errors, setup, pulls: pulls.map(|pull| (list[pull.parameter].id.as_str(), pull)).collect() }
-    }
-
-    /// Whether this is a set-up parameter.
-    pub fn is_setup(&self, id: &str) -> bool {
-        self.setup.iter().any(|p| p.id == id)
+        Estimates { errors, setup, pulls: pulls.map(|pull| (list[pull.parameter].id.to_string(), pull)).collect() }
     }
 
     /// The table of the errors; without `--all`, the most significant ones.
@@ -103,7 +97,7 @@ impl<'r> Estimates<'r> {
     /// The number of set-up parameters and the one that the readings move furthest from its stated value, in standard
     /// deviations.
     pub fn setup_in_short(&self) -> String {
-        let largest = |a: &&(&str, Pull), b: &&(&str, Pull)| a.1.pull.abs().total_cmp(&b.1.pull.abs());
+        let largest = |a: &&(String, Pull), b: &&(String, Pull)| a.1.pull.abs().total_cmp(&b.1.pull.abs());
         let largest = match self.pulls.iter().max_by(largest) {
             Some((id, pull)) => format!(", largest pull {:.1} ({id})", pull.pull.abs()),
             None => String::new(),

@@ -53,7 +53,7 @@ pub fn with_set_ups_freed(problem: &mut Problem, before: &Fit) -> Result<Option<
         for j in contradicted {
             let parameter = &mut problem.parameters.list[j];
             parameter.prior = Prior::Gaussian(parameter.size);
-            freed.push(parameter.id.clone());
+            freed.push(parameter.id.to_string());
         }
         found = fit(problem, Some(&found.beta))?;
     }

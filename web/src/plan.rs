@@ -8,7 +8,6 @@ use abbe::codegen::{Equation, Options, Order, SessionTest, Symbols, check};
 use abbe::document::{Stated, in_reading_units};
 use abbe::equation::EquationParameters;
 use abbe::files::template;
-use abbe::identify::parameters::Role;
 use abbe::identify::problem::Problem;
 use abbe::identify::series::paths;
 use abbe::model::axis::AxisKind;
@@ -93,9 +92,9 @@ impl Plan {
                 })).collect::<Vec<_>>(),
             })
         });
-        let parameters = self.problem.parameters.list.iter().map(|parameter| {
-            json!({ "id": parameter.id, "unit": parameter.unit.name, "setup": parameter.role == Role::Setup })
-        });
+        let parameters = self.problem.parameters.list.iter().map(
+            |parameter| json!({ "id": parameter.id, "unit": parameter.unit.name, "setup": parameter.id.is_setup() }),
+        );
         json!({
             "machine": machine.name,
             "chain": machine.code(),

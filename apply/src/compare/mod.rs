@@ -35,7 +35,6 @@ use faer::Mat;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::numerics::symmetric::Symmetric;
 use abbe_identify::numerics::tails::{chi_square_tail, normal_tail};
-use abbe_identify::parameters::Role;
 use abbe_trace::validate::machine::differences;
 pub use inputs::{Input, compare_inputs};
 use results::{Comparison, Difference, NotComparable, OnlyIn, Pair};
@@ -133,7 +132,7 @@ fn pair(a: &Named<'_>, b: &Named<'_>, options: &CompareOptions) -> Result<Compar
     let SharedDifference { mut delta, mut covariance, shared, refuted } =
         shared::difference(a.model, b.model, &common, options.shared.as_deref())?;
     let (held, transfer) = gauge::one_gauge(a.model, b.model, &common, &mut delta, &mut covariance)?;
-    let id = |k: usize| a.model.parameters[common[k].0].id.clone();
+    let id = |k: usize| a.model.parameters[common[k].0].id.to_string();
     let mut differences = Vec::new();
     for k in (0..common.len()).filter(|k| !held.contains(k)) {
         let u = covariance[(k, k)].max(0.0).sqrt();
@@ -162,10 +161,8 @@ fn pair(a: &Named<'_>, b: &Named<'_>, options: &CompareOptions) -> Result<Compar
         let missing = own.carried_parameters().into_iter().filter(|j| !common.iter().any(|pair| side(pair) == *j));
         let mut ids: BTreeMap<String, ()> = BTreeMap::new();
         for j in missing.filter(|j| !own.parameters[*j].held) {
-            let id = match own.parameters[j].role {
-                Role::Coefficient { effect, .. } | Role::Number { effect, .. } => own.effects[effect].id(),
-                _ => own.parameters[j].id.clone(),
-            };
+            let absent = &own.parameters[j];
+            let id = absent.effect.map_or_else(|| absent.id.to_string(), |effect| own.effects[effect].id());
             ids.insert(id, ());
         }
         ids.into_keys().map(|id| OnlyIn { id, model: of.name.clone() }).collect()
@@ -202,12 +199,9 @@ fn common(a: &IdentifiedModel, b: &IdentifiedModel) -> Vec<(usize, usize)> {
     let same = |i: usize, j: usize| {
         let (p, q) = (&a.parameters[i], &b.parameters[j]);
         p.id == q.id
-            && match (p.role, q.role) {
-                (Role::Coefficient { effect: e, .. }, Role::Coefficient { effect: f, .. })
-                | (Role::Number { effect: e, .. }, Role::Number { effect: f, .. }) => {
-                    a.effects[e].is_same_but_for_numbers(&b.effects[f])
-                }
-                (p, q) => p == q,
+            && match (p.effect, q.effect) {
+                (Some(e), Some(f)) => a.effects[e].is_same_but_for_numbers(&b.effects[f]),
+                _ => true,
             }
     };
     let pairs = a.carried_parameters().into_iter();

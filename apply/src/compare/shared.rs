@@ -24,7 +24,6 @@ use super::results::NotShared;
 use abbe_identify::model_file::{IdentifiedModel, ModelParameter};
 use abbe_identify::numerics::symmetric::pseudo_inverse;
 use abbe_identify::numerics::tails::normal_tail;
-use abbe_identify::parameters::Role;
 
 /// Least share of a prior variance by which readings have to lower it to contain information about the object.
 const LEAST_SHARE: f64 = 1e-3;
@@ -106,7 +105,7 @@ pub(super) fn difference(
         let ((i, j), (p, q)) = (ends[k], ends[l]);
         joint[(j, q)] - joint[(j, p)] - joint[(i, q)] + joint[(i, p)]
     });
-    let shared = shared.iter().map(|(i, _)| a.parameters[*i].id.clone()).collect();
+    let shared = shared.iter().map(|(i, _)| a.parameters[*i].id.to_string()).collect();
     Ok(SharedDifference { delta, covariance, shared, refuted })
 }
 
@@ -137,7 +136,7 @@ fn refuted(a: &IdentifiedModel, b: &IdentifiedModel, shared: &mut Vec<(usize, us
 
 /// The kind of a set-up quantity: `bar` of `bar[C100]`, `workpiece_ball` of `workpiece_ball.x[P1]`.
 fn thing(model: &IdentifiedModel, parameter: usize) -> &str {
-    model.parameters[parameter].id.split(['[', '.']).next().unwrap_or_default()
+    model.parameters[parameter].id.thing().unwrap_or_default()
 }
 
 /// The test of one object by the readings of both sessions; `None` if one of them contains no information about it.
@@ -180,7 +179,7 @@ fn shared(
     b: &IdentifiedModel,
     things: Option<&[String]>,
 ) -> Result<Vec<(usize, usize)>, Diagnostic> {
-    let is_setup = |p: &ModelParameter| p.role == Role::Setup && !p.held;
+    let is_setup = |p: &ModelParameter| p.id.is_setup() && !p.held;
     let of_both = a.parameters.iter().enumerate().filter(|(_, p)| is_setup(p)).filter_map(|(i, p)| {
         let same = |q: &ModelParameter| q.id == p.id && is_setup(q) && q.prior == p.prior;
         b.parameters.iter().position(same).map(|j| (i, j))

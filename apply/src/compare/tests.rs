@@ -192,7 +192,7 @@ fn models_without_a_common_estimate_are_refused() {
 #[test]
 fn a_shared_bar_keeps_one_prior_under_enlarged_uncertainties() {
     let fitted = model(&plan(), &[], &[], 10);
-    let own = |id: &str| fitted.parameters.iter().find(|parameter| parameter.id == id).unwrap().clone();
+    let own = |id: &str| fitted.parameters.iter().find(|own| own.id.to_string() == id).unwrap().clone();
     let (noise, bar) = (1e-3, 2e-3);
     let of = |reading_mm: f64, bars: f64, enlargement: f64| {
         let mut model = fitted.clone();

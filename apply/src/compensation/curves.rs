@@ -15,9 +15,8 @@ use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::driver::{DriverPart, DriverSample};
 use abbe_model::effect::{Component, Effect};
 
-use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::model_file::motion::over_own_axis;
-use abbe_identify::parameters::Role;
+use abbe_identify::model_file::{IdentifiedModel, ModelParameter};
 
 /// One error motion as a function of the position of its axis.
 #[derive(Clone, Debug)]
@@ -143,11 +142,9 @@ pub fn of_model(model: &IdentifiedModel, references: &[(String, f64)]) -> Result
     let machine = &model.machine;
     let list = &model.parameters;
     for parameter in list {
-        if parameter.role != Role::Error || !parameter.identifiable {
-            continue;
-        }
-        match ErrorName::parse(&parameter.id) {
-            Some(name) if name.kind == ErrorKind::Location => result.locations.push((name, parameter.value)),
+        match parameter.id.error().filter(|_| parameter.identifiable) {
+            None => {}
+            Some(name) if name.kind == ErrorKind::Location => result.locations.push((name.clone(), parameter.value)),
             _ => result
                 .left_out
                 .push(format!("{}: a constant error motion is not a function of the position", parameter.id)),
@@ -166,9 +163,9 @@ pub fn of_model(model: &IdentifiedModel, references: &[(String, f64)]) -> Result
             left_out("it acts in some tests only, so it is not a property of the axis");
             continue;
         }
-        let of_effect = |wanted: usize| {
-            list.iter().position(|other| other.role == Role::Coefficient { effect: index, coefficient: wanted })
-        };
+        let own =
+            |other: &ModelParameter, is_number: bool| other.effect == Some(index) && other.id.is_number() == is_number;
+        let of_effect = |wanted: usize| list.iter().position(|other| own(other, false) && other.index == wanted);
         let coefficients = (0..effect.shape.coefficients()).map(|k| of_effect(k).filter(|j| list[*j].identifiable));
         let (Some(axis), Some(coefficients)) =
             (machine.axis_index(&error.axis), coefficients.collect::<Option<Vec<usize>>>())
@@ -177,8 +174,7 @@ pub fn of_model(model: &IdentifiedModel, references: &[(String, f64)]) -> Result
             continue;
         };
         let term = (effect.clone(), coefficients.iter().map(|j| list[*j].value).collect());
-        let is_number = |j: &usize| matches!(list[*j].role, Role::Number { effect, .. } if effect == index);
-        let unknowns = coefficients.into_iter().chain((0..list.len()).filter(is_number));
+        let unknowns = coefficients.into_iter().chain((0..list.len()).filter(|j| own(&list[*j], true)));
         if let Some(curve) = result.curves.iter_mut().find(|curve| curve.error == *error) {
             curve.terms.push(term);
             curve.unknowns.extend(unknowns);

@@ -17,7 +17,7 @@ use abbe_identify::error;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
-use abbe_model::component::{ErrorKind, ErrorName};
+use abbe_model::component::ErrorKind;
 use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -186,8 +186,8 @@ pub fn tables(
     }
     let mut columns: Vec<(usize, DVector<f64>)> = Vec::new();
     for (index, parameter) in model.parameters.iter().enumerate() {
-        let name = ErrorName::parse(&parameter.id).filter(|name| name.kind == ErrorKind::Location);
-        let Some(slot) = name.and_then(|name| machine.error_slot(&name)) else { continue };
+        let name = parameter.id.error().filter(|name| name.kind == ErrorKind::Location);
+        let Some(slot) = name.and_then(|name| machine.error_slot(name)) else { continue };
         let moved = |by: f64| {
             let mut errors = errors.clone();
             errors[slot] += by;

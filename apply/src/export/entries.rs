@@ -34,7 +34,6 @@ use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::model_file::carried::States;
 use abbe_identify::model_file::errors::EstimatedErrors;
 use abbe_identify::numerics::parallel;
-use abbe_identify::parameters::Role;
 use abbe_model::pose::Aim;
 
 /// Iterations. The displacements are small against the machine: the second step is already below a nanometre.
@@ -119,15 +118,15 @@ fn follows_position(effect: &Effect) -> bool {
 pub fn best_locations(model: &IdentifiedModel, tool_mm: [f64; 3]) -> Result<(Vec<f64>, Option<Remaining>), Diagnostic> {
     let mut errors = location_errors(model);
     let estimated = |name: &ErrorName| model.machine.error_slot(name).filter(|_| name.kind == ErrorKind::Location);
-    let of_errors = model.parameters.iter().filter(|parameter| parameter.role == Role::Error && !parameter.held);
-    let slots: Vec<usize> = of_errors.filter_map(|own| estimated(&ErrorName::parse(&own.id)?)).collect();
+    let found = model.parameters.iter().filter(|parameter| !parameter.held);
+    let slots: Vec<usize> = found.filter_map(|own| own.id.error().and_then(estimated)).collect();
     if slots.is_empty() || !model.carried_effects().any(|effect| follows_position(&model.effects[effect])) {
         return Ok((errors, None));
     }
     let (free, none) = (vec![true; slots.len()], vec![0.0; slots.len()]);
     let plain: Vec<f64> = slots.iter().map(|slot| errors[*slot]).collect();
     let mut lines = Lines::of(model, slots.clone(), &Travel::measured(model), tool_mm)?;
-    let set_up_anew = model.parameters.iter().any(|own| own.role == Role::Setup && own.prior == Prior::Free);
+    let set_up_anew = model.parameters.iter().any(|own| own.id.is_setup() && own.prior == Prior::Free);
     if set_up_anew {
         lines = lines.with_free_set_up();
     }
@@ -302,9 +301,8 @@ impl<'m> Lines<'m> {
         let model = self.model;
         let states = States { readings: self.grid.clone(), tool_mm: self.tool_mm, table_mm: model.table_mm };
         let carried = model.carried_parameters();
-        let used = |parameter: usize| match model.parameters[parameter].role {
-            Role::Coefficient { effect, .. } | Role::Number { effect, .. } => follows_position(&model.effects[effect]),
-            _ => true,
+        let used = |parameter: usize| {
+            model.parameters[parameter].effect.is_none_or(|effect| follows_position(&model.effects[effect]))
         };
         let mut slots: Vec<usize> = Vec::new();
         let contributions: Vec<_> = model
@@ -330,10 +328,7 @@ impl<'m> Lines<'m> {
             let column = self.centred(column);
             changes.push((parameter, self.solve(free, &[&column]).column(0).into_owned()));
             let own = &model.parameters[parameter];
-            let id = match own.role {
-                Role::Coefficient { effect, .. } | Role::Number { effect, .. } => model.effects[effect].id(),
-                _ => own.id.clone(),
-            };
+            let id = own.effect.map_or_else(|| own.id.to_string(), |effect| model.effects[effect].id());
             let vectors = column.iter().map(|vector| vector * own.value);
             match sources.iter_mut().find(|(known, _)| *known == id) {
                 Some((_, sum)) => sum.iter_mut().zip(vectors).for_each(|(sum, vector)| *sum += vector),

@@ -14,7 +14,6 @@ use abbe_model::frames::Rotation;
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use abbe_identify::model_file::IdentifiedModel;
-use abbe_identify::parameters::Role;
 
 use crate::error::unrepresentable;
 
@@ -41,9 +40,8 @@ pub struct Branch {
 /// The location errors of a model by slot of its machine, mm and rad.
 pub fn location_errors(model: &IdentifiedModel) -> Vec<f64> {
     let mut slots = vec![0.0; model.machine.error_slots()];
-    for parameter in model.parameters.iter().filter(|parameter| parameter.role == Role::Error) {
-        let name = abbe_model::component::ErrorName::parse(&parameter.id);
-        if let Some(slot) = name.and_then(|name| model.machine.error_slot(&name)) {
+    for parameter in &model.parameters {
+        if let Some(slot) = parameter.id.error().and_then(|name| model.machine.error_slot(name)) {
             slots[slot] = parameter.value;
         }
     }

@@ -25,7 +25,6 @@ use super::travel::Travel;
 use crate::compare::workspace::AxisRange;
 use crate::error::unrepresentable;
 use abbe_identify::model_file::IdentifiedModel;
-use abbe_identify::parameters::Role;
 
 /// The publicly documented kinematic model of a control.
 pub struct KinematicModel {
@@ -158,8 +157,7 @@ pub fn table(
         axis: model.machine.axes[axes[axis]].name.clone(),
     };
     let index = |name: &ErrorName| {
-        let id = name.to_string();
-        let own = model.parameters.iter().position(|p| p.role == Role::Error && p.id == id);
+        let own = model.parameters.iter().position(|p| p.id.error() == Some(name));
         own.filter(|index| model.is_estimated(*index))
     };
     // The errors of each line, and those of them that the readings determine.
@@ -241,7 +239,7 @@ fn plain_by_parameter(known: &[Vec<usize>; LINES.len()]) -> Vec<(usize, DVector<
 
 /// The identified errors and the effects that no entry holds by itself.
 fn no_entry(model: &IdentifiedModel, known: &[Vec<usize>; LINES.len()]) -> Vec<String> {
-    let errors = model.parameters.iter().enumerate().filter(|(_, parameter)| parameter.role == Role::Error);
+    let errors = model.parameters.iter().enumerate().filter(|(_, parameter)| parameter.id.is_error());
     let errors = errors
         .filter(|(index, _)| !known.iter().flatten().any(|known| known == index) && model.is_estimated(*index))
         .map(|(_, parameter)| format!("{}: the control's model has no entry for it", parameter.id));

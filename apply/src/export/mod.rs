@@ -21,20 +21,15 @@ pub mod travel;
 pub mod urdf;
 pub mod urdf_patch;
 
-use abbe_model::component::{ErrorKind, ErrorName};
+use abbe_model::component::ErrorKind;
 
 use abbe_identify::model_file::IdentifiedModel;
-use abbe_identify::parameters::Role;
 
 /// What a description of fixed geometry cannot hold: the effects of a model, and errors that are no location errors.
 pub fn left_out(model: &IdentifiedModel) -> Vec<String> {
     let mut left_out: Vec<String> = model.effects.iter().map(abbe_model::effect::Effect::id).collect();
-    for parameter in model.parameters.iter().filter(|parameter| parameter.role == Role::Error && !parameter.held) {
-        let motion = ErrorName::parse(&parameter.id).is_some_and(|name| name.kind == ErrorKind::Motion);
-        if motion {
-            left_out.push(parameter.id.clone());
-        }
-    }
+    let errors = model.parameters.iter().filter(|parameter| !parameter.held).filter_map(|own| own.id.error());
+    left_out.extend(errors.filter(|name| name.kind == ErrorKind::Motion).map(ToString::to_string));
     left_out
 }
 

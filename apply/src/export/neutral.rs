@@ -8,7 +8,7 @@ use abbe_identify::model_file::IdentifiedModel;
 use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
-use abbe_model::component::{ErrorKind, ErrorName};
+use abbe_model::component::ErrorKind;
 use nalgebra::{DMatrix, Vector3};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -65,8 +65,8 @@ pub fn places(model: &IdentifiedModel) -> Result<Vec<AxisPlace>, Diagnostic> {
     // The derivatives by the location errors of the model.
     let mut columns: Vec<(usize, Vec<f64>)> = Vec::new();
     for (index, parameter) in model.parameters.iter().enumerate() {
-        let name = ErrorName::parse(&parameter.id).filter(|name| name.kind == ErrorKind::Location);
-        let Some(slot) = name.and_then(|name| machine.error_slot(&name)) else { continue };
+        let name = parameter.id.error().filter(|name| name.kind == ErrorKind::Location);
+        let Some(slot) = name.and_then(|name| machine.error_slot(name)) else { continue };
         let moved = |by: f64| {
             let mut errors = errors.clone();
             errors[slot] += by;

@@ -3,7 +3,6 @@
 use abbe_files::robot::dh::Convention;
 use abbe_identify::model_file::{IdentifiedModel, ModelParameter, Provenance};
 use abbe_identify::noise::{Noise, NoiseSource};
-use abbe_identify::parameters::Role;
 use abbe_identify::results::ModelFit;
 use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::frames::Point;
@@ -21,8 +20,9 @@ pub(super) fn model(machine: Machine, errors: &[(String, f64)]) -> IdentifiedMod
     let parameters: Vec<ModelParameter> = errors
         .iter()
         .map(|(id, value)| ModelParameter {
-            id: id.clone(),
-            role: Role::Error,
+            id: id.parse().unwrap(),
+            effect: None,
+            index: 0,
             unit: Unit::Micrometre.into(),
             value: *value,
             held: false,

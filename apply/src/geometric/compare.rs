@@ -12,7 +12,6 @@ use serde::Serialize;
 use super::{Estimate, Estimator, Method};
 use abbe_identify::fit::{self, Fit};
 use abbe_identify::noise::ReadingNoise;
-use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 
 /// The circle centre of one test.
@@ -120,7 +119,7 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
     // The known errors are those of the full fit, without set-up quantities and effects.
     let mut known = vec![0.0; list.len()];
     for (p, parameter) in list.iter().enumerate() {
-        if parameter.role == Role::Error && full.rank.is_identifiable(p) {
+        if parameter.id.is_error() && full.rank.is_identifiable(p) {
             known[p] = full.beta[p];
         }
     }
@@ -131,14 +130,14 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
 
     let mut errors = Vec::new();
     for (p, parameter) in list.iter().enumerate() {
-        if parameter.role != Role::Error {
+        if !parameter.id.is_error() {
             continue;
         }
         let display = parameter.unit.display_per_internal;
         let index = estimator.errors.iter().position(|error| *error == p);
         let identifiable = full.rank.is_identifiable(p).then_some(());
         errors.push(ComparisonRow {
-            id: parameter.id.clone(),
+            id: parameter.id.to_string(),
             unit: parameter.unit.name.clone(),
             value: index.map(|k| estimate.values[k] * display),
             u: index.map(|k| estimate.covariance[(k, k)].max(0.0).sqrt() * full.u_enlargement * display),
@@ -222,7 +221,7 @@ fn test_has(problem: &Problem, name: &str) -> bool {
 
 fn centres(problem: &Problem, estimator: &Estimator, estimate: &Estimate, u_enlargement: f64) -> Vec<CentreResult> {
     let list = &problem.parameters.list;
-    let declared: Vec<usize> = (0..list.len()).filter(|p| list[*p].role == Role::Error).collect();
+    let declared: Vec<usize> = (0..list.len()).filter(|p| list[*p].id.is_error()).collect();
     let letter = |k: usize| ["X", "Y", "Z"][k].to_string();
     let tests = estimator.tests.iter().zip(&estimator.geometries).zip(&estimate.centres);
     tests
@@ -233,7 +232,7 @@ fn centres(problem: &Problem, estimator: &Estimator, estimate: &Estimate, u_enla
                 estimate.centre_covariance[(row, row)].max(0.0).sqrt() * u_enlargement * 1e3
             };
             let sensitivity = |which: usize, p: usize| OffsetSensitivity {
-                id: list[p].id.clone(),
+                id: list[p].id.to_string(),
                 value: estimator.sensitivities[(2 * test_index + which, p)] * 1e3 / list[p].unit.display_per_internal,
                 unit: format!("um/{}", list[p].unit.name),
             };

@@ -26,7 +26,6 @@ pub use compare::{CentreResult, Comparison, ComparisonRow, compare};
 
 use abbe_identify::numerics::solve::Svd;
 use abbe_identify::numerics::tolerances::COLLINEAR;
-use abbe_identify::parameters::Role;
 use abbe_identify::problem::{Problem, RowBlock};
 use abbe_model::session::Prior;
 use abbe_model::words::counted;
@@ -123,9 +122,9 @@ impl Estimator {
         let directions = Svd::of(of_errors.as_ref())?;
         let rank = directions.rank(COLLINEAR);
         if rank < errors.len() {
-            let confounded: Vec<&str> = (0..errors.len())
+            let confounded: Vec<String> = (0..errors.len())
                 .filter(|k| (rank..errors.len()).any(|j| directions.right()[(*k, j)].abs() > 1e-3))
-                .map(|k| problem.parameters.list[errors[k]].id.as_str())
+                .map(|k| problem.parameters.list[errors[k]].id.to_string())
                 .collect();
             let (tests, errors) = (counted(tests.len(), "test"), confounded.join(", "));
             let found = format!("the centres of {tests} do not separate the errors {errors}");
@@ -162,9 +161,7 @@ impl Estimator {
             variance * a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>()
         });
         for (p, parameter) in problem.parameters.list.iter().enumerate() {
-            let (Role::Setup, Prior::Gaussian(u)) = (parameter.role, parameter.prior) else {
-                continue;
-            };
+            let (true, Prior::Gaussian(u)) = (parameter.id.is_setup(), parameter.prior) else { continue };
             for i in 0..rows {
                 for j in 0..rows {
                     centre_covariance[(i, j)] += self.sensitivities[(i, p)] * u * u * self.sensitivities[(j, p)];
@@ -199,15 +196,12 @@ fn chosen(method: Method, circles: Vec<(usize, CircleGeometry)>) -> Vec<(usize, 
 /// The declared errors of the turning axes that the method identifies.
 fn errors(problem: &Problem, method: Method, geometries: &[CircleGeometry]) -> Vec<usize> {
     let machine = &problem.session.machine;
-    let of_method = |id: &str| {
-        let Some(name) = ErrorName::parse(id) else {
-            return false;
-        };
+    let of_method = |name: &ErrorName| {
         let turns = geometries.iter().any(|geometry| machine.axes[geometry.axis].name == name.axis);
         turns && (method != Method::Circle || !name.freedom.is_angle())
     };
     let list = &problem.parameters.list;
-    (0..list.len()).filter(|p| list[*p].role == Role::Error && of_method(&list[*p].id)).collect()
+    (0..list.len()).filter(|p| list[*p].id.error().is_some_and(of_method)).collect()
 }
 
 /// `S` at the nominal machine.

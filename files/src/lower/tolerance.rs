@@ -7,6 +7,7 @@ use abbe_model::document::from_node;
 use abbe_model::document::node::{Node, Value};
 use abbe_model::document::tolerance as document;
 use abbe_model::document::value::Positive;
+use abbe_model::parameter_id::ParameterId;
 use abbe_model::session::limits;
 use abbe_model::session::tolerance::{Limit, TestFigure, Tolerance, Toleranced};
 
@@ -63,7 +64,7 @@ fn of_parameter(machine: &Machine, unknowns: &[ErrorName], key: &str, node: &Nod
         ));
     };
     // Errors of effects are named as in results; whether they exist is known after the fit.
-    let id = if id.contains('~') {
+    let id = if let Ok(id @ ParameterId::Effect(..)) = id.parse::<ParameterId>() {
         id.to_string()
     } else {
         let mut name = ErrorName::parse(id).ok_or_else(|| {

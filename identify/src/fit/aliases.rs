@@ -17,7 +17,6 @@ use faer::Mat;
 
 use crate::numerics::parallel;
 use crate::numerics::solve::Svd;
-use crate::parameters::Role;
 use crate::problem::Problem;
 
 /// An alias in the place of its effect.
@@ -83,10 +82,7 @@ pub fn at_solution(problem: &Problem, beta: &[f64]) -> Result<Vec<EffectAliases>
     let squares = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
     let mut found = Vec::new();
     for (number, own) in places.iter().enumerate().filter(|(_, own)| !own.is_empty()) {
-        let is_own = |j: usize| match problem.parameters.list[j].role {
-            Role::Coefficient { effect, .. } | Role::Number { effect, .. } => effect == number,
-            Role::Error | Role::Setup => false,
-        };
+        let is_own = |j: usize| problem.parameters.list[j].effect == Some(number);
         let others: Vec<usize> = (0..count).filter(|j| !is_own(*j)).collect();
         let without: Vec<f64> = (0..r.nrows())
             .map(|i| c[i] + (0..count).filter(|j| is_own(*j)).map(|j| r[(i, j)] * beta[j]).sum::<f64>())

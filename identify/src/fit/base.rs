@@ -20,7 +20,6 @@ use std::sync::Arc;
 
 use abbe_model::Diagnostic;
 use abbe_model::chain::Machine;
-use abbe_model::component::ErrorName;
 use faer::Mat;
 
 use super::Fit;
@@ -29,7 +28,7 @@ use crate::numerics::null_space::{MIN_PIVOT, echelon};
 use crate::numerics::solve::Svd;
 use crate::numerics::triangle::Triangle;
 use crate::parameter_description::parameter_meaning;
-use crate::parameters::{Parameter, Role, natural};
+use crate::parameters::{Parameter, kind, natural};
 use crate::problem::Problem;
 use crate::results::{BaseResult, Estimate};
 
@@ -55,21 +54,17 @@ impl Gauge {
     /// The parameters in the order in which they are preferably held.
     fn preference(self, machine: &Machine, list: &[Parameter]) -> Vec<usize> {
         let kind = |parameter: &Parameter| {
-            let kind = match parameter.role {
-                Role::Error => 0,
-                Role::Coefficient { .. } | Role::Number { .. } => 1,
-                Role::Setup => 2,
-            };
+            let kind = kind(&parameter.id);
             if self == Gauge::SetUp { 2 - kind } else { kind }
         };
         let own = |parameter: &Parameter| {
-            let name = ErrorName::parse(&parameter.id).filter(|_| self == Gauge::OwnDirection);
-            let axis = name.as_ref().and_then(|name| machine.axis_index(&name.axis));
+            let name = parameter.id.error().filter(|_| self == Gauge::OwnDirection);
+            let axis = name.and_then(|name| machine.axis_index(&name.axis));
             name.zip(axis)
                 .is_some_and(|(name, axis)| machine.axes[axis].direction[name.freedom.index() % 3].abs() > OWN_SHARE)
         };
         let mut order: Vec<usize> = (0..list.len()).collect();
-        order.sort_by_cached_key(|j| (kind(&list[*j]), own(&list[*j]), natural(&list[*j].id)));
+        order.sort_by_cached_key(|j| (kind(&list[*j]), own(&list[*j]), natural(&list[*j].id.to_string())));
         order
     }
 }
@@ -148,7 +143,8 @@ impl BaseParameters {
         let display = known.unit.display_per_internal;
         let value = problem.parameters.value(parameter, &self.beta) * display;
         let u = self.covariance[(parameter, parameter)].max(0.0).sqrt() * display;
-        Estimate::new(&known.id, value, u, &known.unit.name).with_meaning(parameter_meaning(problem, parameter, None))
+        Estimate::new(known.id.clone(), value, u, &known.unit.name)
+            .with_meaning(parameter_meaning(problem, parameter, None))
     }
 }
 
@@ -162,7 +158,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<BaseResult, Diagnostic> {
     let kept = (0..list.len()).filter(|j| !base.held.contains(j));
     Ok(BaseResult {
         parameters: kept.map(|j| base.estimate(problem, j)).collect(),
-        held_at_nominal: base.held.iter().map(|j| list[*j].id.clone()).collect(),
+        held_at_nominal: base.held.iter().map(|j| list[*j].id.to_string()).collect(),
         combinations_at_nominal: base.held_combinations,
         prediction_change_um: base.prediction_change_mm * 1e3,
     })
@@ -230,7 +226,8 @@ mod tests {
         let mut session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
         let names =
             ["X", "Y", "Z", "A", "B", "C"].into_iter().flat_map(|freedom| ["A", "C"].map(|axis| (freedom, axis)));
-        session.unknowns = names.filter_map(|(f, axis)| ErrorName::parse(&format!("E{f}0{axis}"))).collect();
+        session.unknowns =
+            names.filter_map(|(f, axis)| abbe_model::component::ErrorName::parse(&format!("E{f}0{axis}"))).collect();
         let (problem, fit) = prepare(&session, 1).unwrap();
         let held_by_fit = fit.rank.null_space.ncols();
         assert!(held_by_fit > 0);

@@ -90,7 +90,7 @@ pub fn null_space(problem: &Problem, rank: &Rank) -> NullSpace {
         })
         .collect();
     NullSpace {
-        ids: involved.iter().map(|j| list[*j].id.clone()).collect(),
+        ids: involved.iter().map(|j| list[*j].id.to_string()).collect(),
         units: involved.iter().map(|j| list[*j].unit.name.clone()).collect(),
         vectors,
     }

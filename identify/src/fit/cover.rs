@@ -11,6 +11,7 @@
 //! The covariance has the changes of one alias correlated: `D·(Σ δδᵀ)·D` for each effect, with `D` such that the
 //! diagonal is the largest `δ²`.
 
+use abbe_model::parameter_id::ParameterId;
 use faer::Mat;
 
 use super::Fit;
@@ -122,7 +123,7 @@ pub(super) fn cover(parameters: &mut [Estimate], problem: &Problem, fit: &Fit) {
                 let effect = &problem.parameters.effects[aliases.effect];
                 let alias = effect.aliases.get(aliases.aliases[place].alias);
                 parameter.enlarged_by.push(EnlargedBy {
-                    effect: problem.parameters.effect_ids[aliases.effect].clone(),
+                    effect: problem.parameters.effect_ids[aliases.effect].to_string(),
                     alias: alias.map(|alias| alias.id()).unwrap_or_default(),
                     change: shift,
                 });
@@ -132,7 +133,7 @@ pub(super) fn cover(parameters: &mut [Estimate], problem: &Problem, fit: &Fit) {
             parameter.u_without_aliases = Some(without);
         }
         let mut u = variance.sqrt();
-        if parameter.id.ends_with(".phase") {
+        if parameter.is(ParameterId::is_phase) {
             u = u.min(u_of_undetermined_phase_deg());
         }
         parameter.set_u(u);

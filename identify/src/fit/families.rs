@@ -30,7 +30,7 @@ use crate::noise::NoiseSource;
 use crate::numerics::evidence::{NormalEquations, Posterior};
 use crate::numerics::parallel;
 use crate::numerics::products::NormalProducts;
-use crate::parameters::{Parameters, Role};
+use crate::parameters::Parameters;
 use crate::problem::Problem;
 pub use bordered::Bordered;
 
@@ -47,7 +47,7 @@ pub struct Family {
 pub fn families(parameters: &Parameters) -> Vec<Family> {
     let mut families: Vec<Family> = Vec::new();
     for (j, parameter) in parameters.list.iter().enumerate() {
-        let Role::Coefficient { effect, .. } = parameter.role else { continue };
+        let Some(effect) = parameter.coefficient_of() else { continue };
         let Some(name) = parameters.effects[effect].family() else { continue };
         match families.iter_mut().find(|family| family.name == name) {
             Some(family) => family.parameters.push(j),

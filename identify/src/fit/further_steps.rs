@@ -21,7 +21,6 @@ use abbe_model::effect::Effect;
 use super::positions::Projection;
 use super::{Fit, Problem};
 use crate::numerics::regression::dot;
-use crate::parameters::Role;
 
 /// Positions at which a further step is tried, at even distances on the travel.
 const PLACES: usize = 64;
@@ -55,11 +54,8 @@ pub(super) fn at_solution(problem: &Problem, fit: &Fit) -> Result<Vec<(f64, Vec<
     let (_, residual) = model.split(&c);
     let mut covered = Vec::new();
     for (number, columns) in added {
-        let own = parameters.list.iter().zip(&fit.beta).filter_map(|(parameter, value)| match parameter.role {
-            Role::Coefficient { effect, .. } if effect == number => Some(value * value),
-            _ => None,
-        });
-        let squares: Vec<f64> = own.collect();
+        let own = parameters.list.iter().zip(&fit.beta).filter(|(own, _)| own.coefficient_of() == Some(number));
+        let squares: Vec<f64> = own.map(|(_, value)| value * value).collect();
         let mean_square = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
         // Logarithm of the Bayes factor, and changes for the root mean square of the height.
         let tried: Vec<(f64, Vec<f64>)> = columns

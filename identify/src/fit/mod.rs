@@ -23,6 +23,7 @@ pub mod tpoint;
 use std::cell::RefCell;
 
 use abbe_model::Diagnostic;
+use abbe_model::parameter_id::ParameterId;
 use abbe_model::session::Prior;
 use abbe_model::words::listed;
 use faer::Mat;
@@ -33,7 +34,7 @@ use crate::numerics::least_squares::{LeastSquares, Scaling, minimise};
 use crate::numerics::rank::Rank;
 use crate::numerics::tails::residual_tail;
 use crate::numerics::triangle::Triangle;
-use crate::parameters::{Parameter, Role};
+use crate::parameters::Parameter;
 use crate::problem::Problem;
 
 pub use aliases::{AliasChange, EffectAliases, at_solution as aliases_at_solution};
@@ -125,12 +126,12 @@ impl LeastSquares for IdentifiableDirections<'_> {
     /// The largest step against its physical size first.
     fn still_moved(&self, step: &[f64]) -> String {
         let list = &self.problem.parameters.list;
-        let mut moved: Vec<(f64, &str)> = (self.rank.parameters_at(step).iter().zip(list))
-            .map(|(step, parameter)| ((step / parameter.size).abs(), parameter.id.as_str()))
+        let mut moved: Vec<(f64, &ParameterId)> = (self.rank.parameters_at(step).iter().zip(list))
+            .map(|(step, parameter)| ((step / parameter.size).abs(), &parameter.id))
             .filter(|(share, _)| *share > 0.0)
             .collect();
         moved.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let names: Vec<&str> = moved.iter().take(MAX_NAMED).map(|(_, id)| *id).collect();
+        let names: Vec<String> = moved.iter().take(MAX_NAMED).map(|(_, id)| id.to_string()).collect();
         match names[..] {
             [] => String::new(),
             _ => format!(
@@ -212,7 +213,7 @@ fn minimum_beside(problem: &Problem, start: Option<&[f64]>, before: Option<&Fit>
         // Far from the machine the readings depend on these directions in another way: what is found there is no estimate.
         let list = problem.parameters.list.iter();
         let is_far = |((after, before), parameter): ((&f64, &f64), &Parameter)| {
-            parameter.role != Role::Setup && (after - before).abs() > FAR * parameter.size
+            !parameter.id.is_setup() && (after - before).abs() > FAR * parameter.size
         };
         let lowered = problem.sum_of_squares(&further.beta) <= problem.sum_of_squares(&found.beta);
         if !lowered || further.beta.iter().zip(&found.beta).zip(list).any(is_far) {

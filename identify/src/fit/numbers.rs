@@ -31,7 +31,6 @@ use abbe_model::session::Prior;
 use super::{Fit, finish, fit, minimum, minimum_beside, positions};
 use crate::error::NO_CONVERGENCE;
 use crate::numerics::tails::QUANTILE_95;
-use crate::parameters::Role;
 use crate::problem::Problem;
 
 /// Maximum number of linearisations.
@@ -172,7 +171,7 @@ fn settle(problem: &mut Problem, from: &mut Vec<f64>) -> Result<(), Diagnostic> 
 /// The estimated numbers, by index among the parameters.
 fn numbers(problem: &Problem) -> impl Iterator<Item = usize> {
     let list = &problem.parameters.list;
-    (0..list.len()).filter(|j| matches!(list[*j].role, Role::Number { .. }))
+    (0..list.len()).filter(|j| list[*j].id.is_number())
 }
 
 /// The profile intervals of the numbers in which χ² is not parabolic.

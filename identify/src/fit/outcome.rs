@@ -2,6 +2,7 @@
 
 use abbe_model::Diagnostic;
 use abbe_model::instrument::Checked;
+use abbe_model::parameter_id::ParameterId;
 use abbe_model::session::{Prior, Test};
 use abbe_model::words::counted;
 
@@ -11,7 +12,7 @@ use crate::linear::{Linearisation, is_of_interest};
 use crate::noise::{NoiseSource, stated_against_repeats};
 use crate::numerics::rank::Rank;
 use crate::numerics::tails::chi_square_tails;
-use crate::parameters::Role;
+use crate::parameters::Parameter;
 use crate::plausibility::Pulls;
 use crate::problem::Problem;
 use crate::results::{
@@ -88,10 +89,9 @@ impl Determined {
             }
         };
         let mut determined = Determined { by: (0..list.len()).map(of_null_space).collect(), by_prior: Vec::new() };
-        let is_number = |role: Role| matches!(role, Role::Number { .. });
         let has_prior =
-            |role: Role, prior: Prior| (role == Role::Setup || is_number(role)) && matches!(prior, Prior::Gaussian(_));
-        if !list.iter().any(|parameter| has_prior(parameter.role, parameter.prior)) {
+            |own: &Parameter| (own.id.is_setup() || own.id.is_number()) && matches!(own.prior, Prior::Gaussian(_));
+        if !list.iter().any(has_prior) {
             return Ok(determined);
         }
         // Priors of families determine their coefficients. They are no statement about the set-up.
@@ -99,7 +99,7 @@ impl Determined {
         let linear = Linearisation::of(&problem, &vec![0.0; kept.len()])?;
         let alone = Rank::decide(&linear.readings, &linear.size, &linear.preference)?;
         for (k, j) in kept.iter().enumerate() {
-            let of_interest = is_of_interest(&list[*j]) || is_number(list[*j].role);
+            let of_interest = is_of_interest(&list[*j]) || list[*j].id.is_number();
             let by_prior = of_interest && linear.rank.is_identifiable(k) && !alone.is_identifiable(k);
             if by_prior && determined.by[*j] == DeterminedBy::Readings {
                 determined.by[*j] = DeterminedBy::Prior;
@@ -112,14 +112,13 @@ impl Determined {
     /// States what determines the estimates of a model, and whether they may be quoted.
     pub fn mark(&self, problem: &Problem, parameters: &mut [Estimate], goodness: Goodness) {
         let list = problem.parameters.list.iter();
-        let by_prior: Vec<&str> = (list.zip(&self.by))
+        let by_prior: Vec<ParameterId> = (list.zip(&self.by))
             .filter(|(_, by)| **by == DeterminedBy::Prior)
-            .map(|(parameter, _)| parameter.id.trim_end_matches(".cos").trim_end_matches(".sin"))
+            .map(|(parameter, _)| parameter.id.cosine())
             .collect();
         for parameter in parameters {
             parameter.quotable = goodness.quotable;
-            let own = parameter.id.trim_end_matches(".amplitude").trim_end_matches(".phase");
-            if by_prior.contains(&own) {
+            if parameter.id.parse::<ParameterId>().is_ok_and(|id| by_prior.contains(&id.cosine())) {
                 parameter.set_determined_by(DeterminedBy::Prior);
             }
         }
@@ -130,7 +129,7 @@ impl Determined {
         let list = problem.parameters.list.iter().zip(&self.by);
         let open = |by: DeterminedBy| matches!(by, DeterminedBy::BaseCombination | DeterminedBy::Nothing);
         list.filter(|(_, by)| open(**by))
-            .map(|(parameter, by)| NotEstimated { id: parameter.id.clone(), determined_by: *by })
+            .map(|(parameter, by)| NotEstimated { id: parameter.id.to_string(), determined_by: *by })
             .collect()
     }
 }
@@ -199,7 +198,7 @@ fn noise(problem: &Problem, contradicted: Option<String>) -> Assumption {
 fn priors(problem: &Problem, fit: &Fit) -> Option<Assumption> {
     let list = &problem.parameters.list;
     let stated = |prior: Prior| matches!(prior, Prior::Gaussian(_));
-    let count = list.iter().filter(|parameter| parameter.role == Role::Setup && stated(parameter.prior)).count();
+    let count = list.iter().filter(|parameter| parameter.id.is_setup() && stated(parameter.prior)).count();
     if count == 0 {
         return None;
     }

@@ -24,7 +24,7 @@ use super::{Fit, Problem};
 use crate::numerics::regression::dot;
 use crate::numerics::solve::Svd;
 use crate::numerics::tails::QUANTILE_95;
-use crate::parameters::Role;
+use crate::parameters::Parameter;
 
 /// Share of a column that remains after the projection below which the model contains it.
 const CONTAINED: f64 = 1e-9;
@@ -165,8 +165,8 @@ fn steps<'p>(problem: &Problem, levels: &'p [Vec<f64>]) -> Vec<Step<'p>> {
     let (parameters, mut found) = (&problem.parameters, Vec::new());
     for (effect, step) in parameters.positions() {
         let (levels, positions) = (levels[effect].as_slice(), parameters.effects[effect].shape.positions());
-        let is_height = |role: Role| role == Role::Coefficient { effect, coefficient: step };
-        let height = parameters.list.iter().position(|parameter| is_height(parameter.role));
+        let is_height = |own: &Parameter| own.coefficient_of() == Some(effect) && own.index == step;
+        let height = parameters.list.iter().position(is_height);
         let Some(height) = height.filter(|_| levels.len() > 1) else { continue };
         let gap_of = |at: f64| levels.partition_point(|level| *level < at).clamp(1, levels.len() - 1);
         let gap = gap_of(positions[step]);

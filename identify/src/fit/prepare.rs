@@ -15,7 +15,6 @@ use crate::heldout::{rms_by_unit_mm, rms_mm};
 use crate::noise::{self, Noise, NoiseSource, PureError, ShownNoise, outliers};
 use crate::numerics::solve::Svd;
 use crate::numerics::triangle::Triangle;
-use crate::parameters::Role;
 use crate::plausibility;
 use crate::problem::Problem;
 
@@ -274,7 +273,7 @@ fn nominal_residual_mm(problem: &Problem) -> Result<f64, Diagnostic> {
     let list = &problem.parameters.list;
     let nominal = vec![0.0; list.len()];
     let (r, c, rest) = Triangle::new(list.len()).merged(&problem.triangles(&nominal)?).parts();
-    let setups: Vec<usize> = (0..list.len()).filter(|j| list[*j].role == Role::Setup).collect();
+    let setups: Vec<usize> = (0..list.len()).filter(|j| list[*j].id.is_setup()).collect();
     let mut left = c;
     if !setups.is_empty() {
         // Without their priors set-up quantities may be collinear: the solution of least norm.

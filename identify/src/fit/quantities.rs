@@ -2,7 +2,6 @@
 //! the positions of steps.
 
 use super::{Fit, StepPosition};
-use crate::parameters::Role;
 use crate::problem::Problem;
 use crate::unit::ParameterUnit;
 
@@ -41,7 +40,8 @@ pub(crate) fn quantities(problem: &Problem, fit: &Fit) -> Vec<Quantity> {
     let mut quantities = Vec::new();
     let mut j = 0;
     while j < list.len() {
-        if let Role::Coefficient { effect, coefficient: 0 } = list[j].role {
+        let of_effect = list[j].coefficient_of();
+        if let Some(effect) = of_effect.filter(|_| list[j].index == 0) {
             let effect = &problem.parameters.effects[effect];
             if effect.shape.needs_prior() {
                 let count = effect.shape.coefficients();
@@ -59,7 +59,8 @@ pub(crate) fn quantities(problem: &Problem, fit: &Fit) -> Vec<Quantity> {
         if rank.is_identifiable(j) {
             quantities.push(Quantity::Parameter(j));
         }
-        if let Role::Coefficient { effect, coefficient } = list[j].role {
+        if let Some(effect) = of_effect {
+            let coefficient = list[j].index;
             let is_last = coefficient + 1 == problem.parameters.effects[effect].shape.coefficients();
             // The position of a step whose height is not identifiable is none either.
             let is_seen = |position: &StepPosition| {

@@ -1,7 +1,10 @@
 //! A fit in the form of its results: display units, words, and the lists of what is not identifiable and of outliers.
 
+use std::sync::Arc;
+
 use abbe_model::Diagnostic;
 use abbe_model::effect::description::meaning;
+use abbe_model::parameter_id::{ParameterId, Part};
 use abbe_model::unit::ARCSEC_PER_RAD;
 
 use super::outcome::{self, Determined};
@@ -108,7 +111,7 @@ pub fn model(
         degrees_of_freedom: fit.degrees_of_freedom,
         birge_ratio: fit.birge_ratio,
         outcome: outcome::outcome(problem, fit, goodness, &determined),
-        identifiable: ids(problem, &parameters),
+        identifiable: ids(&parameters),
         covariance: covariance::of_parameters(problem, fit, &parameters),
         unobservable: unobservable(problem, &fit.rank),
         null_space: covariance::null_space(problem, &fit.rank),
@@ -165,8 +168,8 @@ pub(crate) fn parameters_of_noise(problem: &Problem, fit: &Fit) -> Vec<Estimate>
                 let unit = &list[j].unit;
                 let value = problem.parameters.value(j, &fit.beta) * unit.display_per_internal;
                 let u = u_internal(j) * unit.display_per_internal;
-                let mut result =
-                    Estimate::new(&list[j].id, value, u, &unit.name).with_meaning(parameter_meaning(problem, j, None));
+                let mut result = Estimate::new(list[j].id.clone(), value, u, &unit.name)
+                    .with_meaning(parameter_meaning(problem, j, None));
                 let interval = fit.intervals.iter().find(|interval| interval.parameter == j);
                 result.interval_95 =
                     interval.map(|interval| interval.ends.map(|end| value + end * unit.display_per_internal));
@@ -183,11 +186,12 @@ fn position(problem: &Problem, position: &StepPosition) -> Estimate {
     let effect = &problem.parameters.effects[number];
     let ParameterUnit { name, display_per_internal } = ParameterUnit::of_number(&problem.session, effect);
     let [value, u] = [effect.shape.positions()[step], u].map(|value| value * display_per_internal);
-    let id = problem.parameters.position_id(number, step);
-    let which = if effect.shape.positions().len() > 1 { format!("position {}", step + 1) } else { "position".into() };
+    let place = (effect.shape.positions().len() > 1).then_some(step + 1);
+    let id = ParameterId::Effect(Arc::clone(&problem.parameters.effect_ids[number]), Part::Position(place));
+    let which = place.map_or("position".to_string(), |place| format!("position {place}"));
     let meaning = format!("{}, {which}", meaning(&problem.session.machine, effect));
     let interval_95 = interval_95.map(|ends| ends.map(|end| end * display_per_internal));
-    Estimate { interval_95, ..Estimate::new(&id, value, u, &name).with_meaning(meaning) }
+    Estimate { interval_95, ..Estimate::new(id, value, u, &name).with_meaning(meaning) }
 }
 
 /// The rms of a spectrum over a period, with the uncertainty by propagation.
@@ -200,16 +204,11 @@ fn rms_of_spectrum(problem: &Problem, fit: &Fit, first: usize, count: usize) -> 
     let variance: f64 = products.sum();
     let display = parameter.unit.display_per_internal;
     let u = variance.max(0.0).sqrt() * fit.u_enlargement * display;
-    let id = parameter.id.trim_end_matches("cos1");
-    Estimate::new(format!("{id}rms"), rms * display, u, &parameter.unit.name).with_meaning(parameter_meaning(
-        problem,
-        first,
-        Some("rms"),
-    ))
+    Estimate::new(parameter.id.with_part(Part::Rms), rms * display, u, &parameter.unit.name)
+        .with_meaning(parameter_meaning(problem, first, Some(&Part::Rms)))
 }
 
 fn amplitude_and_phase(problem: &Problem, fit: &Fit, j: usize) -> [Estimate; 2] {
-    let id = problem.parameters.list[j].id.trim_end_matches(".cos");
     let (a, b) = (fit.beta[j], fit.beta[j + 1]);
     let cov = |p: usize, q: usize| fit.covariance[(p, q)] * fit.u_enlargement.powi(2);
     let amplitude = a.hypot(b);
@@ -224,21 +223,21 @@ fn amplitude_and_phase(problem: &Problem, fit: &Fit, j: usize) -> [Estimate; 2] 
     };
     let display = unit.display_per_internal;
     let u_amplitude = along.max(0.0).sqrt() * display;
-    let result = |name: &str, value: f64, u: f64, unit: &str| {
-        Estimate::new(format!("{id}.{name}"), value, u, unit).with_meaning(parameter_meaning(problem, j, Some(name)))
+    let result = |part: Part, value: f64, u: f64, unit: &str| {
+        let meaning = parameter_meaning(problem, j, Some(&part));
+        Estimate::new(problem.parameters.list[j].id.with_part(part), value, u, unit).with_meaning(meaning)
     };
     let mut pair = [
-        result("amplitude", amplitude * display, u_amplitude, &unit.name),
-        result("phase", (-b).atan2(a).to_degrees(), u_phase, "deg"),
+        result(Part::Amplitude, amplitude * display, u_amplitude, &unit.name),
+        result(Part::Phase, (-b).atan2(a).to_degrees(), u_phase, "deg"),
     ];
     phases_follow_amplitudes(&mut pair);
     pair
 }
 
 /// The identifiers of parameters that have a column of the Jacobian: positions of steps have none and count in no rank.
-fn ids(problem: &Problem, parameters: &[Estimate]) -> Vec<String> {
-    let ids = parameters.iter().map(|parameter| parameter.id.clone());
-    ids.filter(|id| !problem.parameters.is_position(id)).collect()
+fn ids(parameters: &[Estimate]) -> Vec<String> {
+    parameters.iter().filter(|own| !own.is(ParameterId::is_position)).map(|own| own.id.clone()).collect()
 }
 
 /// The null-space combinations, in display units and in words.
@@ -252,9 +251,9 @@ pub fn unobservable(problem: &Problem, rank: &Rank) -> Vec<Unobservable> {
             .map(|j| (j, row[j] * list[j].size * list[j].unit.display_per_internal))
             .collect();
         let leading = displayed.first().map_or(1.0, |(_, value)| *value);
-        let combination = displayed.iter().map(|(j, value)| (list[*j].id.clone(), value / leading)).collect();
+        let combination = displayed.iter().map(|(j, value)| (list[*j].id.to_string(), value / leading)).collect();
         let leader = &list[*pivot];
-        let others: Vec<&str> = displayed[1..].iter().map(|(j, _)| list[*j].id.as_str()).collect();
+        let others: Vec<String> = displayed[1..].iter().map(|(j, _)| list[*j].id.to_string()).collect();
         let (finding, why) = match weak_u {
             Some(u) => (Finding::Weak, weak(leader, &others, *u)),
             None if others.is_empty() => {

@@ -83,10 +83,10 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<PointingTerms, Diagnostic>
             value_arcsec: number(value),
             u_arcsec: number(u),
             sigma_arcsec: number(u * sigma_per_u),
-            parameters: of.iter().map(|(j, _)| list[*j].id.clone()).collect(),
+            parameters: of.iter().map(|(j, _)| list[*j].id.to_string()).collect(),
         });
     }
-    let without = (0..list.len()).filter(|j| terms[*j].is_none()).map(|j| list[j].id.clone());
+    let without = (0..list.len()).filter(|j| terms[*j].is_none()).map(|j| list[j].id.to_string());
     Ok(PointingTerms {
         stars,
         sky_rms_arcsec: sky_rms * per_mm,

@@ -27,7 +27,6 @@ use crate::error;
 use crate::numerics::parallel;
 use crate::numerics::symmetric::Symmetric;
 use crate::numerics::triangle::Triangle;
-use crate::parameters::Role;
 use crate::problem::Problem;
 
 /// Largest mean variance of the predicted readings, in variances of the noise, for a test to be judged.
@@ -95,7 +94,7 @@ pub fn left_out_tests(problem: &Problem, beta: &[f64]) -> Result<LeftOutTests, D
         match judged? {
             Ok(step) => steps.push(Some(step.iter().zip(&size).map(|(step, size)| step * size).collect::<Vec<f64>>())),
             Err(named) => {
-                let parameters = named.into_iter().map(|j| problem.parameters.list[j].id.clone()).collect();
+                let parameters = named.into_iter().map(|j| problem.parameters.list[j].id.to_string()).collect();
                 not_left_out.push(NotLeftOut { test, parameters });
                 steps.push(None);
             }
@@ -115,7 +114,7 @@ fn own_setup(problem: &Problem, test: usize) -> Vec<usize> {
         others.any(|other| problem.own_parameters(other).contains(&j))
     };
     let own = problem.own_parameters(test).iter().copied();
-    own.filter(|j| problem.parameters.list[*j].role == Role::Setup && !elsewhere(*j)).collect()
+    own.filter(|j| problem.parameters.list[*j].id.is_setup() && !elsewhere(*j)).collect()
 }
 
 /// Normal matrix and right-hand side, in parameters scaled by their physical size.

@@ -17,7 +17,7 @@ use abbe_model::session::{Prior, Session, Test};
 
 use super::IdentifiedModel;
 use super::errors::{EstimatedErrors, MachineErrors};
-use crate::parameters::{Parameters, Role, SlotContribution};
+use crate::parameters::{Parameters, SlotContribution};
 
 /// States of the machine at which its errors are evaluated, and the points that gravity loads.
 #[derive(Clone, Debug)]
@@ -45,12 +45,9 @@ impl IdentifiedModel {
     /// The parameters that belong to the machine, by index in [`IdentifiedModel::parameters`]: location errors, then
     /// coefficients of effects.
     pub fn carried_parameters(&self) -> Vec<usize> {
-        let carried = |j: &usize| match self.parameters[*j].role {
-            Role::Error => true,
-            Role::Setup => false,
-            Role::Coefficient { effect, .. } | Role::Number { effect, .. } => {
-                IdentifiedModel::is_carried(&self.effects[effect])
-            }
+        let carried = |j: &usize| match self.parameters[*j].effect {
+            Some(effect) => IdentifiedModel::is_carried(&self.effects[effect]),
+            None => self.parameters[*j].id.is_error(),
         };
         (0..self.parameters.len()).filter(carried).collect()
     }
@@ -58,16 +55,15 @@ impl IdentifiedModel {
     /// The estimate of a parameter, internal units: a number of a shape is stated itself, not as its change.
     pub fn estimate(&self, parameter: usize) -> f64 {
         let parameter = &self.parameters[parameter];
-        match parameter.role {
-            Role::Number { effect, number } => self.effects[effect].shape.number(number) + parameter.value,
-            Role::Error | Role::Setup | Role::Coefficient { .. } => parameter.value,
+        match parameter.effect.filter(|_| parameter.id.is_number()) {
+            Some(effect) => self.effects[effect].shape.number(parameter.index) + parameter.value,
+            None => parameter.value,
         }
     }
 
     /// The location errors of the model.
     pub fn errors(&self) -> Vec<ErrorName> {
-        let errors = self.parameters.iter().filter(|parameter| parameter.role == Role::Error);
-        errors.filter_map(|parameter| ErrorName::parse(&parameter.id)).collect()
+        self.parameters.iter().filter_map(|parameter| parameter.id.error().cloned()).collect()
     }
 
     /// A session of this machine with the parameters of the model: its location errors and the effects that belong to

@@ -7,6 +7,7 @@ use abbe_model::document::kind::Kind;
 use abbe_model::document::machine::Machine;
 use abbe_model::document::print;
 use abbe_model::document::value::{Json, Long, Positive};
+use abbe_model::parameter_id::ParameterId;
 use abbe_model::unit::Unit;
 use schemars::JsonSchema;
 use serde::ser::Error;
@@ -127,7 +128,7 @@ pub struct InputFile {
 #[schemars(rename = "ModelParameter")]
 pub struct Parameter {
     /// Identifier, as in the results of a fit.
-    pub id: String,
+    pub id: ParameterId,
     /// What it is.
     pub role: Role,
     /// Index of the effect of a coefficient or of a number.
@@ -176,6 +177,18 @@ pub enum Role {
     Coefficient,
     /// A number of the shape of an effect that was estimated.
     Number,
+}
+
+impl Role {
+    /// Of a parameter of a model.
+    pub fn of(id: &ParameterId) -> Role {
+        match id {
+            ParameterId::Error(_) => Role::Location,
+            ParameterId::Setup { .. } => Role::SetUp,
+            ParameterId::Effect(..) if id.is_number() => Role::Number,
+            ParameterId::Effect(..) => Role::Coefficient,
+        }
+    }
 }
 
 /// A location error.

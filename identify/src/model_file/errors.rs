@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use abbe_model::Diagnostic;
 use abbe_model::chain::Machine;
-use abbe_model::component::ErrorName;
 use abbe_model::driver::{DriverInput, DriverSample, Reference};
 use abbe_model::effect::{Effect, EffectPart};
 use abbe_model::instrument::Station;
@@ -13,7 +12,6 @@ use abbe_model::session::readings::Readings;
 
 use crate::error;
 use crate::model_file::IdentifiedModel;
-use crate::parameters::Role;
 
 /// The errors at positions near the commanded ones, by slot of the machine, mm or rad.
 pub type ErrorsNear<'a> = Box<dyn Fn(&Readings) -> Result<SlotValues, Diagnostic> + 'a>;
@@ -66,15 +64,11 @@ impl EstimatedErrors {
         let coefficients = |effect: &Effect| vec![0.0; effect.shape.coefficients()];
         let mut coefficients: Vec<Vec<f64>> = model.effects.iter().map(coefficients).collect();
         for parameter in &model.parameters {
-            match parameter.role {
-                Role::Error => {
-                    let name = ErrorName::parse(&parameter.id);
-                    if let Some(slot) = name.and_then(|name| machine.error_slot(&name)) {
-                        constant[slot] = parameter.value;
-                    }
-                }
-                Role::Coefficient { effect, coefficient } => coefficients[effect][coefficient] = parameter.value,
-                Role::Setup | Role::Number { .. } => {}
+            if let Some(slot) = parameter.id.error().and_then(|name| machine.error_slot(name)) {
+                constant[slot] = parameter.value;
+            }
+            if let Some(effect) = parameter.effect.filter(|_| parameter.id.is_coefficient()) {
+                coefficients[effect][parameter.index] = parameter.value;
             }
         }
         let effects = model.carried_effects().map(|index| EstimatedEffect {

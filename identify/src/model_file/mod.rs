@@ -24,12 +24,12 @@ use abbe_model::component::ErrorName;
 use abbe_model::driver::Reference;
 use abbe_model::effect::Effect;
 use abbe_model::instrument::InstrumentKind;
+use abbe_model::parameter_id::ParameterId;
 use abbe_model::session::Prior;
 use abbe_model::unit::Unit;
 use faer::Mat;
 
 use crate::noise::Noise;
-use crate::parameters::Role;
 use crate::results::{Goodness, GoodnessVerdict, ModelFit, ParameterChange};
 use crate::unit::ParameterUnit;
 pub use document::{InputFile, MotionRange, Provenance};
@@ -39,10 +39,12 @@ pub use read::{is_model, of_source, read};
 /// A parameter of a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelParameter {
-    /// Identifier in results: `EY0A`, `bar[A100]`, `EZC~C:h2.cos`.
-    pub id: String,
-    /// The kind; a coefficient refers to [`IdentifiedModel::effects`].
-    pub role: Role,
+    /// What it is.
+    pub id: ParameterId,
+    /// Index of its effect among [`IdentifiedModel::effects`], of a coefficient or a number of a shape.
+    pub effect: Option<usize>,
+    /// Index among the coefficients of its effect, or among the numbers of its shape.
+    pub index: usize,
     /// Display unit.
     pub unit: ParameterUnit,
     /// Value in internal units (mm, rad); 0 if it is held.
@@ -61,7 +63,12 @@ impl ModelParameter {
     /// A change by a value with a standard uncertainty, both in internal units.
     pub fn change(&self, value: f64, u: f64) -> ParameterChange {
         let display = self.unit.display_per_internal;
-        ParameterChange { id: self.id.clone(), value: value * display, u: u * display, unit: self.unit.name.clone() }
+        ParameterChange {
+            id: self.id.to_string(),
+            value: value * display,
+            u: u * display,
+            unit: self.unit.name.clone(),
+        }
     }
 }
 

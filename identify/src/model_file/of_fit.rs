@@ -10,7 +10,6 @@ use crate::error;
 use crate::fit::base::{Gauge, base_parameters};
 use crate::fit::{Fit, minimum};
 use crate::heldout::stated_rms_mm;
-use crate::parameters::Role;
 use crate::problem::Problem;
 use crate::results::ModelFit;
 
@@ -27,7 +26,8 @@ impl IdentifiedModel {
         let list = &problem.parameters.list;
         let parameters = list.iter().enumerate().map(|(j, parameter)| ModelParameter {
             id: parameter.id.clone(),
-            role: parameter.role,
+            effect: parameter.effect,
+            index: parameter.index,
             unit: parameter.unit.clone(),
             value: base.beta[j] + parameter.found,
             held: base.held.contains(&j),
@@ -70,8 +70,8 @@ impl IdentifiedModel {
 /// The location errors as the same readings give them without any effect.
 fn locations(problem: &Problem, fit: &Fit) -> Result<Vec<(ErrorName, f64)>, Diagnostic> {
     let named = |problem: &Problem, beta: &[f64]| {
-        let errors = problem.parameters.list.iter().zip(beta).filter(|(parameter, _)| parameter.role == Role::Error);
-        errors.filter_map(|(parameter, value)| Some((ErrorName::parse(&parameter.id)?, *value))).collect()
+        let values = problem.parameters.list.iter().zip(beta);
+        values.filter_map(|(parameter, value)| Some((parameter.id.error()?.clone(), *value))).collect()
     };
     if problem.parameters.effects.is_empty() {
         return Ok(named(problem, &fit.beta));

@@ -25,7 +25,6 @@ use super::write::{CHECKSUM, checksum};
 use super::{DriverRange, IdentifiedModel, ModelParameter};
 use crate::noise::Noise;
 use crate::numerics::symmetric::Symmetric;
-use crate::parameters::Role;
 use crate::unit::ParameterUnit;
 
 /// Least eigenvalue of a covariance over its largest, in scaled parameters, below 0 by rounding.
@@ -170,17 +169,14 @@ fn parameters(
         .map(|j| parameter(&entries[..j], &entries[j], effects, machine).within_item(j))
         .collect::<Result<_, _>>()?;
     for (k, effect) in effects.iter().enumerate() {
-        let own = |j: &&ModelParameter| matches!(j.role, Role::Coefficient { effect, .. } if effect == k);
+        let own = |own: &&ModelParameter| own.effect == Some(k) && own.id.is_coefficient();
         let (needed, found) = (effect.shape.coefficients(), parameters.iter().filter(own).count());
         if found != needed {
             let what = format!("have {found} coefficients of `effects[{k}]`, whose shape has {needed}");
             return Err(Fault::of_key(what, None));
         }
-        let number = |j: &ModelParameter| match j.role {
-            Role::Number { effect, number } if effect == k => Some(number),
-            _ => None,
-        };
-        if !parameters.iter().filter_map(number).eq(effect.estimated.iter().copied()) {
+        let numbers = parameters.iter().filter(|own| own.effect == Some(k) && own.id.is_number());
+        if !numbers.map(|number| number.index).eq(effect.estimated.iter().copied()) {
             return Err(Fault::of_key(format!("do not have the numbers that `effects[{k}]` estimates"), None));
         }
     }
@@ -205,34 +201,25 @@ fn parameter(
     if let Some(other) = others.iter().find(same) {
         return Err(fault(&format!("it is the coefficient of an effect that {} is too", other.id)));
     }
-    let role = match (entry.role, entry.effect, entry.coefficient) {
-        (document::Role::Location, None, None) => {
-            let known = ErrorName::parse(&entry.id).is_some_and(|name| machine.error_slot(&name).is_some());
-            if !known {
-                return Err(fault("the machine has no such error"));
-            }
-            Role::Error
-        }
-        (document::Role::SetUp, None, None) => Role::Setup,
-        (document::Role::Coefficient, Some(effect), Some(coefficient))
-            if effects.get(effect).is_some_and(|effect| coefficient < effect.shape.coefficients()) =>
-        {
-            Role::Coefficient { effect, coefficient }
-        }
-        (document::Role::Number, Some(effect), Some(number))
-            if effects.get(effect).is_some_and(|effect| effect.estimated.contains(&number)) =>
-        {
-            Role::Number { effect, number }
-        }
-        _ => {
-            return Err(fault(
-                "`role` is \"location\", \"set-up\", \"coefficient\" or \"number\", the last two with an index of `effects`",
-            ));
-        }
+    if entry.role == document::Role::Location && entry.id.error().and_then(|name| machine.error_slot(name)).is_none() {
+        return Err(fault("the machine has no such error"));
+    }
+    let effect = entry.effect.and_then(|effect| effects.get(effect));
+    let is_known = match (entry.role, effect, entry.coefficient) {
+        (document::Role::Coefficient, Some(effect), Some(place)) => place < effect.shape.coefficients(),
+        (document::Role::Number, Some(effect), Some(place)) => effect.estimated.contains(&place),
+        (document::Role::Location | document::Role::SetUp, ..) => (entry.effect, entry.coefficient) == (None, None),
+        _ => false,
     };
+    if !is_known || entry.role != document::Role::of(&entry.id) {
+        return Err(fault(
+            "`role` is \"location\", \"set-up\", \"coefficient\" or \"number\", the last two with an index of `effects`",
+        ));
+    }
     Ok(ModelParameter {
         id: entry.id.clone(),
-        role,
+        effect: entry.effect,
+        index: entry.coefficient.unwrap_or_default(),
         unit: ParameterUnit { name: entry.unit.clone(), display_per_internal: entry.display_per_internal.0 },
         value: entry.internal,
         held: entry.held,

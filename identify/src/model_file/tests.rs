@@ -70,7 +70,7 @@ fn a_model_reads_back_to_the_same_bits_and_predicts_the_same_readings() {
 #[test]
 fn errors_at_states_are_those_of_the_effects() {
     let model = read_text(&text()).unwrap();
-    let value = |id: &str| model.parameters.iter().find(|parameter| parameter.id == id).unwrap().value;
+    let value = |id: &str| model.parameters.iter().find(|own| own.id.to_string() == id).unwrap().value;
     let c = model.machine.axis_index("C").unwrap();
     let angles = [0.1, 0.7, 2.0];
     let mut positions = vec![vec![0.0; 3]; model.machine.axes.len()];

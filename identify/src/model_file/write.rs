@@ -12,7 +12,6 @@ use sha2::{Digest, Sha256};
 use super::IdentifiedModel;
 use super::document::{self, Document, SCHEMA, SCHEMA_VERSION};
 use crate::error;
-use crate::parameters::Role;
 
 /// The key of the checksum.
 pub(super) const CHECKSUM: &str = "sha256";
@@ -80,18 +79,12 @@ impl IdentifiedModel {
 
     fn parameter(&self, j: usize) -> document::Parameter {
         let parameter = &self.parameters[j];
-        let (role, effect, coefficient) = match parameter.role {
-            Role::Error => (document::Role::Location, None, None),
-            Role::Setup => (document::Role::SetUp, None, None),
-            Role::Coefficient { effect, coefficient } => (document::Role::Coefficient, Some(effect), Some(coefficient)),
-            Role::Number { effect, number } => (document::Role::Number, Some(effect), Some(number)),
-        };
         let display = parameter.unit.display_per_internal;
         document::Parameter {
             id: parameter.id.clone(),
-            role,
-            effect,
-            coefficient,
+            role: document::Role::of(&parameter.id),
+            effect: parameter.effect,
+            coefficient: parameter.effect.map(|_| parameter.index),
             value: self.estimate(j) * display,
             u: (!parameter.held).then(|| self.u(j) * display),
             unit: parameter.unit.name.clone(),

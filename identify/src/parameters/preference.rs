@@ -1,8 +1,9 @@
 //! The rank over the parameters of a session, and the order of preference of the pivots of its null space.
 
 use abbe_model::Diagnostic;
+use abbe_model::parameter_id::ParameterId;
 
-use super::{Parameter, Parameters, Role};
+use super::{Parameter, Parameters};
 use crate::numerics::rank::Rank;
 use crate::numerics::tolerances::MIN_IDENTIFIABLE;
 use crate::numerics::triangle::Triangle;
@@ -26,7 +27,7 @@ impl Parameters {
     /// # Errors
     /// If the factor has entries that are not finite.
     pub fn rank_above(&self, triangle: &Triangle, least: (f64, usize)) -> Result<Rank, Diagnostic> {
-        let is_set_up: Vec<bool> = self.list.iter().map(|parameter| parameter.role == Role::Setup).collect();
+        let is_set_up: Vec<bool> = self.list.iter().map(|parameter| parameter.id.is_setup()).collect();
         let sizes = self.sizes();
         Rank::decide_above(triangle, &sizes, &pivot_preference(&self.list), least)?
             .with_set_up_first(&is_set_up, &sizes)
@@ -42,14 +43,18 @@ impl Parameters {
 /// Within each kind the order is that of the identifiers, with numbers compared by value (`EA0J2` before `EA0J10`). The
 /// order of declarations has no effect.
 pub fn pivot_preference(list: &[Parameter]) -> Vec<usize> {
-    let kind = |parameter: &Parameter| match parameter.role {
-        Role::Error => 0,
-        Role::Coefficient { .. } | Role::Number { .. } => 1,
-        Role::Setup => 2,
-    };
     let mut order: Vec<usize> = (0..list.len()).collect();
-    order.sort_by_cached_key(|j| (kind(&list[*j]), natural(&list[*j].id)));
+    order.sort_by_cached_key(|j| (kind(&list[*j].id), natural(&list[*j].id.to_string())));
     order
+}
+
+/// The place of its kind in the order: errors, effects, the set-up.
+pub(crate) fn kind(id: &ParameterId) -> usize {
+    match id {
+        ParameterId::Error(_) => 0,
+        ParameterId::Effect(..) => 1,
+        ParameterId::Setup { .. } => 2,
+    }
 }
 
 /// Splits an identifier into pieces for natural sorting: text compares as text, digits as a number.
@@ -75,27 +80,21 @@ mod tests {
 
     #[test]
     fn pivots_are_preferred_by_kind_and_name_and_not_by_declaration() {
-        let parameter = |id: &str, role: Role| Parameter {
-            id: id.to_string(),
+        let parameter = |id: &str| Parameter {
+            id: id.parse().unwrap(),
             unit: InternalUnit::Millimetre.displayed().into(),
             size: 1.0,
             prior: Prior::Free,
-            role,
+            effect: None,
+            index: 0,
             found: 0.0,
         };
-        let coefficient = Role::Coefficient { effect: 0, coefficient: 0 };
-        let mut list = vec![
-            parameter("bar[A]", Role::Setup),
-            parameter("EX0J10", Role::Error),
-            parameter("EX0J2", Role::Error),
-            parameter("EZC~C:h2.sin", coefficient),
-            parameter("EA0J2", Role::Error),
-            parameter("EZC~C:h2.cos", coefficient),
-        ];
+        let ids = ["bar[A]", "EX0J10", "EX0J2", "EZC~C:h2.sin", "EA0J2", "EZC~C:h2.cos"];
+        let mut list: Vec<Parameter> = ids.into_iter().map(parameter).collect();
         let wanted = ["EA0J2", "EX0J2", "EX0J10", "EZC~C:h2.cos", "EZC~C:h2.sin", "bar[A]"];
         for _ in 0..list.len() {
             list.rotate_left(1);
-            let names: Vec<&str> = pivot_preference(&list).iter().map(|j| list[*j].id.as_str()).collect();
+            let names: Vec<String> = pivot_preference(&list).iter().map(|j| list[*j].id.to_string()).collect();
             assert_eq!(names, wanted);
         }
     }

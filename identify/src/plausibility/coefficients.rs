@@ -4,7 +4,7 @@
 //! zero in all of them. The fit then explains micrometres by a coefficient of kilometres. Such an estimate is named.
 
 use crate::fit::Fit;
-use crate::parameters::{Role, physical_size};
+use crate::parameters::physical_size;
 use crate::problem::Problem;
 use crate::results::COVERAGE_FACTOR;
 
@@ -17,7 +17,7 @@ pub fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
     let mut named: Vec<usize> = Vec::new();
     let mut warnings = Vec::new();
     for (j, parameter) in problem.parameters.list.iter().enumerate() {
-        let Role::Coefficient { effect, .. } = parameter.role else { continue };
+        let Some(effect) = parameter.coefficient_of() else { continue };
         let component = &problem.parameters.effects[effect].component;
         let Some(unit) = component.unit(&problem.session.instrument_parameters()) else { continue };
         let u = fit.covariance[(j, j)].max(0.0).sqrt() * fit.u_enlargement;

@@ -14,13 +14,12 @@
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{ERRORS_PER_AXIS, Machine};
-use abbe_model::component::{ErrorKind, ErrorName};
+use abbe_model::component::ErrorKind;
 use abbe_model::unit::Unit;
 use nalgebra::Vector3;
 
 use super::results::{Conflict, ConflictKind};
 use crate::fit::Fit;
-use crate::parameters::Role;
 use crate::problem::Problem;
 use crate::results::COVERAGE_FACTOR;
 
@@ -80,8 +79,8 @@ fn slots(problem: &Problem) -> Vec<Option<usize>> {
     let machine = &problem.session.machine;
     let mut slots = vec![None; machine.axes.len() * ERRORS_PER_AXIS];
     for (j, parameter) in problem.parameters.list.iter().enumerate() {
-        let name = ErrorName::parse(&parameter.id).filter(|name| name.kind == ErrorKind::Location);
-        if let Some(slot) = name.filter(|_| parameter.role == Role::Error).and_then(|name| machine.error_slot(&name)) {
+        let name = parameter.id.error().filter(|name| name.kind == ErrorKind::Location);
+        if let Some(slot) = name.and_then(|name| machine.error_slot(name)) {
             slots[slot] = Some(j);
         }
     }

@@ -295,7 +295,7 @@ fn set_ups(problem: &Problem, pulls: &Pulls) -> Vec<Conflict> {
             let outside = |value: f64| value * parameter.unit.display_per_internal;
             Conflict {
                 kind: ConflictKind::SetupParameter,
-                subject: parameter.id.clone(),
+                subject: parameter.id.to_string(),
                 value: outside(pull.estimate),
                 stated: outside(pull.stated_u),
                 unit: parameter.unit.name.clone(),

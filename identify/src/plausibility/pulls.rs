@@ -19,7 +19,6 @@ use crate::fit::Fit;
 use crate::noise::enlargement_of_mean;
 use crate::numerics::gain::ObservableSubspace;
 use crate::numerics::tails::{chi_square_quantile, chi_square_tail, normal_quantile};
-use crate::parameters::Role;
 use crate::problem::Problem;
 
 /// Probability that a correct session is reported as contradicted, once for the largest pull and once for all set-up
@@ -64,8 +63,8 @@ impl Pulls {
     /// Of a fit.
     pub fn of(problem: &Problem, fit: &Fit) -> Pulls {
         let (places, prior): (Vec<usize>, Vec<f64>) = (problem.parameters.list.iter().enumerate())
-            .filter_map(|(j, parameter)| match (parameter.role, parameter.prior) {
-                (Role::Setup, Prior::Gaussian(u)) if fit.rank.is_identifiable(j) => Some((j, u)),
+            .filter_map(|(j, parameter)| match parameter.prior {
+                Prior::Gaussian(u) if parameter.id.is_setup() && fit.rank.is_identifiable(j) => Some((j, u)),
                 _ => None,
             })
             .unzip();

@@ -7,15 +7,14 @@ use num_dual::DualNum;
 
 use super::Problem;
 use crate::numerics::triangle::Triangle;
-use crate::parameters::{Parameter, Role};
+use crate::parameters::Parameter;
 
 impl Problem {
     /// Number of prior observations: the rows of [`Problem::prior_triangle`] without those of numbers of shapes, which
     /// are about the estimates themselves.
     pub fn prior_rows(&self) -> usize {
-        let gaussian = |parameter: &&Parameter| {
-            matches!(parameter.prior, Prior::Gaussian(_)) && !matches!(parameter.role, Role::Number { .. })
-        };
+        let gaussian =
+            |parameter: &&Parameter| matches!(parameter.prior, Prior::Gaussian(_)) && !parameter.id.is_number();
         let list = &self.parameters.list;
         let distances = self.session.socket_distances.iter();
         let stated = distances.filter(|distance| {
@@ -82,8 +81,8 @@ impl Problem {
             return None;
         };
         let mut indices = [0; 3];
-        for (index, coordinate) in indices.iter_mut().zip(["x", "y", "z"]) {
-            let id = format!("socket.{coordinate}[{name}]");
+        for (index, coordinate) in indices.iter_mut().zip(self.tests[test].station.kind().unknowns()) {
+            let id = coordinate.id(name);
             *index = self.parameters.list.iter().position(|parameter| parameter.id == id)?;
         }
         Some((indices, place_mm))

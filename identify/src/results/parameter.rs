@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use abbe_model::parameter_id::ParameterId;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -122,6 +123,11 @@ impl Estimate {
         self.significant = self.exceeds_u() && self.determined_by == DeterminedBy::Readings;
     }
 
+    /// Whether it is a parameter of this kind.
+    pub fn is(&self, kind: fn(&ParameterId) -> bool) -> bool {
+        self.id.parse::<ParameterId>().is_ok_and(|id| kind(&id))
+    }
+
     /// Whether `|value|` exceeds `expanded_u`, be it by the readings or by the set-up priors.
     pub fn exceeds_u(&self) -> bool {
         self.u > 0.0 && self.value.abs() > self.expanded_u
@@ -160,7 +166,7 @@ pub struct ParameterChange {
 /// Gives each phase the significance of the amplitude in front of it.
 pub(crate) fn phases_follow_amplitudes(parameters: &mut [Estimate]) {
     for k in 1..parameters.len() {
-        if parameters[k].id.ends_with(".phase") && parameters[k - 1].id.ends_with(".amplitude") {
+        if parameters[k].is(ParameterId::is_phase) {
             parameters[k].significant = parameters[k - 1].significant;
         }
     }

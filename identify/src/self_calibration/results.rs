@@ -160,10 +160,10 @@ impl Calibration {
             position.as_ref().map_or(Vec::new(), |position| {
                 (0..2)
                     .map(|k| {
-                        let id = self.location(k, &axis);
-                        let meaning = error_meaning(&session.machine, &id);
+                        let name = self.location(k, &axis);
+                        let meaning = error_meaning(&session.machine, &name);
                         let (value, u) = (position.centres_mm[which][k], position.u_mm[which][k]);
-                        Estimate::new(id, value * 1e3, u * 1e3, "um").with_meaning(meaning)
+                        Estimate::new(name.to_string(), value * 1e3, u * 1e3, "um").with_meaning(meaning)
                     })
                     .collect()
             })
@@ -201,9 +201,8 @@ impl Calibration {
     }
 
     /// `EX0C` for the first direction across axis C where that is X.
-    fn location(&self, which: usize, axis: &str) -> String {
+    fn location(&self, which: usize, axis: &str) -> ErrorName {
         ErrorName { kind: ErrorKind::Location, freedom: Freedom::ALL[self.equations.across[which]], axis: axis.into() }
-            .to_string()
     }
 
     fn function(&self, function: Function, axis: &str) -> FunctionResult {
@@ -316,7 +315,7 @@ impl Calibration {
                 None if !self.solution.identifiable[k] || self.u_mm(k) <= 1e-9 * self.sigma_mm => continue,
                 None => self.id(k, axis),
                 Some(_) if !with_position => continue,
-                Some(place @ 0..2) => self.location(place, axis),
+                Some(place @ 0..2) => self.location(place, axis).to_string(),
                 Some(place) => format!("{} by turn", self.location(place - 2, axis)),
             };
             quantities.push(reported(id, distribution));

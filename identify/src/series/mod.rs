@@ -18,12 +18,12 @@ pub mod spectrum;
 
 use abbe_model::Diagnostic;
 use abbe_model::instrument::channel::Channel;
+use abbe_model::parameter_id::ParameterId;
 use abbe_model::sensitivity::TestModel;
 use abbe_model::unit::Unit;
 
 use crate::fit::Fit;
 use crate::heldout::rms_mm;
-use crate::parameters::Role;
 use crate::problem::Problem;
 use abscissa::{Abscissa, PathSegment};
 
@@ -111,13 +111,11 @@ fn shares(problem: &Problem, fit: &Fit) -> Vec<Share> {
         None => shares.push(Share { id: id.to_string(), cause, unknowns: vec![unknown] }),
     };
     for (j, parameter) in problem.parameters.list.iter().enumerate() {
-        match parameter.role {
-            Role::Setup => add("set-up", Cause::Setup, j),
+        match &parameter.id {
+            ParameterId::Setup { .. } => add("set-up", Cause::Setup, j),
             _ if !fit.rank.is_identifiable(j) => add("confounded", Cause::Unseen, j),
-            Role::Error => add(&parameter.id, Cause::Error, j),
-            Role::Coefficient { effect, .. } | Role::Number { effect, .. } => {
-                add(&problem.parameters.effect_ids[effect], Cause::Effect, j);
-            }
+            ParameterId::Error(name) => add(&name.to_string(), Cause::Error, j),
+            ParameterId::Effect(effect, _) => add(&effect.to_string(), Cause::Effect, j),
         }
     }
     shares
@@ -200,11 +198,11 @@ pub fn lengths(values: &[f64], channels: usize) -> Vec<f64> {
 pub fn correlation(problem: &Problem, fit: &Fit) -> (Vec<String>, Vec<Vec<f64>>) {
     let list = &problem.parameters.list;
     let chosen: Vec<usize> = (0..list.len())
-        .filter(|j| list[*j].role != Role::Setup && fit.rank.is_identifiable(*j) && fit.covariance[(*j, *j)] > 0.0)
+        .filter(|j| !list[*j].id.is_setup() && fit.rank.is_identifiable(*j) && fit.covariance[(*j, *j)] > 0.0)
         .collect();
     let of = |j: usize, k: usize| fit.covariance[(j, k)] / (fit.covariance[(j, j)] * fit.covariance[(k, k)]).sqrt();
     let matrix = chosen.iter().map(|j| chosen.iter().map(|k| of(*j, *k)).collect()).collect();
-    let ids = chosen.iter().map(|j| list[*j].id.clone()).collect();
+    let ids = chosen.iter().map(|j| list[*j].id.to_string()).collect();
     (ids, matrix)
 }
 

@@ -116,5 +116,5 @@ pub fn over_poses(problem: &Problem, beta: &[f64]) -> Result<Vec<Sensitivity>, D
 }
 
 fn sensitivity(parameter: &Parameter, values: Vec<f64>) -> Sensitivity {
-    Sensitivity { id: parameter.id.clone(), unit: parameter.unit.name.clone(), values }
+    Sensitivity { id: parameter.id.to_string(), unit: parameter.unit.name.clone(), values }
 }

@@ -165,7 +165,7 @@ mod tests {
     fn bound(goal: &Goal, chosen: &[usize], ridge: f64) -> (f64, f64) {
         let rows = polynomial();
         let shared = SharedParameters {
-            ids: ["a", "b", "c"].map(String::from).to_vec(),
+            ids: ["EX0C", "EY0C", "EZ0C"].map(|id| id.parse().unwrap()).to_vec(),
             size: vec![1.0; 3],
             display_per_internal: vec![1.0; 3],
             targets: 3,

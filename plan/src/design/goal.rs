@@ -2,7 +2,7 @@
 
 use abbe_identify::linear::is_of_interest;
 use abbe_identify::numerics::solve::Svd;
-use abbe_identify::parameters::{Parameter, Role};
+use abbe_identify::parameters::Parameter;
 use abbe_identify::problem::Problem;
 use faer::Mat;
 
@@ -52,11 +52,10 @@ impl Goal {
     /// Indices of its target parameters in a problem.
     pub fn targets(&self, problem: &Problem) -> Vec<usize> {
         let list = &problem.parameters.list;
-        let is_target = |parameter: &Parameter| match (self, parameter.role) {
-            (Goal::Separation { effect, .. }, Role::Coefficient { effect: index, .. }) => {
-                problem.parameters.effects[index].id() == *effect
+        let is_target = |parameter: &Parameter| match self {
+            Goal::Separation { effect, .. } => {
+                parameter.coefficient_of().is_some_and(|own| problem.parameters.effects[own].id() == *effect)
             }
-            (Goal::Separation { .. }, _) => false,
             _ => is_of_interest(parameter),
         };
         (0..list.len()).filter(|j| is_target(&list[*j])).collect()

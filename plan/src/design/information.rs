@@ -12,6 +12,7 @@ use abbe_identify::numerics::reduction::inverse_of_upper;
 use abbe_identify::numerics::triangle::upper;
 use abbe_identify::problem::Problem;
 use abbe_model::Diagnostic;
+use abbe_model::parameter_id::ParameterId;
 use abbe_model::session::Prior;
 use faer::{Mat, MatRef};
 
@@ -19,7 +20,7 @@ use faer::{Mat, MatRef};
 #[derive(Clone, Debug)]
 pub struct SharedParameters {
     /// Their identifiers.
-    pub ids: Vec<String>,
+    pub ids: Vec<ParameterId>,
     /// Physical sizes, internal units.
     pub size: Vec<f64>,
     /// Display units per internal unit.
@@ -61,11 +62,12 @@ impl SharedParameters {
     /// If a parameter does not belong to the problem.
     pub fn root_of(&self, problem: &Problem, linear: &Linearisation) -> Result<Root, Diagnostic> {
         let list = &problem.parameters.list;
-        let index: HashMap<&str, usize> =
-            list.iter().enumerate().map(|(j, parameter)| (parameter.id.as_str(), j)).collect();
-        let known = || list.iter().map(|parameter| &parameter.id);
-        let unknown = |id: &String| error::unknown("the plan", "parameter", id, "its parameters are", known());
-        let columns = self.ids.iter().map(|id| index.get(id.as_str()).copied().ok_or_else(|| unknown(id)));
+        let index: HashMap<&ParameterId, usize> =
+            list.iter().enumerate().map(|(j, parameter)| (&parameter.id, j)).collect();
+        let known = || list.iter().map(|parameter| parameter.id.clone());
+        let unknown =
+            |id: &ParameterId| error::unknown("the plan", "parameter", id.clone(), "its parameters are", known());
+        let columns = self.ids.iter().map(|id| index.get(id).copied().ok_or_else(|| unknown(id)));
         let columns = columns.collect::<Result<Vec<usize>, _>>()?;
         Ok(self.regularised(linear.marginal(&columns)?.as_ref(), 1.0))
     }
@@ -80,9 +82,14 @@ impl SharedParameters {
     /// The root of the readings of a problem with one test, from their triangular factor `r`. Parameters that are not
     /// shared are eliminated within their priors. `as_shared` maps a parameter's identifier to that of the shared
     /// parameter.
-    pub fn root_of_test(&self, problem: &Problem, r: MatRef<'_, f64>, as_shared: impl Fn(&str) -> String) -> Root {
+    pub fn root_of_test(
+        &self,
+        problem: &Problem,
+        r: MatRef<'_, f64>,
+        as_shared: impl Fn(&ParameterId) -> ParameterId,
+    ) -> Root {
         let list = &problem.parameters.list;
-        let column_of = |id: &str| {
+        let column_of = |id: &ParameterId| {
             let name = as_shared(id);
             self.ids.iter().position(|shared| *shared == name)
         };
@@ -156,7 +163,6 @@ mod tests {
 
     use abbe_files::ReadOptions;
     use abbe_identify::noise::{Noise, NoiseSource};
-    use abbe_identify::parameters::Role;
     use faer::linalg::solvers::Solve;
 
     use super::*;
@@ -173,13 +179,13 @@ mod tests {
         let problem = states::problem_by_test(&plan, Noise::white(3e-4, NoiseSource::Stated)).unwrap();
         let list = &problem.parameters.list;
         let linear = Linearisation::of(&problem, &vec![0.0; list.len()]).unwrap();
-        let (shared, own): (Vec<usize>, Vec<usize>) = (0..list.len()).partition(|j| list[*j].role == Role::Error);
+        let (shared, own): (Vec<usize>, Vec<usize>) = (0..list.len()).partition(|j| list[*j].id.is_error());
         let gaussian =
             |j: &&usize| matches!(list[**j].prior, Prior::Gaussian(u) if (u / list[**j].size - 1.0).abs() > 0.5);
         assert!(own.iter().filter(gaussian).count() >= 3, "priors that differ from the physical sizes");
         let shared_parameters = SharedParameters::of(&problem, &[], &shared);
         let r = linear.readings.r();
-        let root = shared_parameters.root_of_test(&problem, r.as_ref(), str::to_string);
+        let root = shared_parameters.root_of_test(&problem, r.as_ref(), Clone::clone);
 
         let whole = r.transpose() * &r;
         let part = |rows: &[usize], columns: &[usize]| {

@@ -24,7 +24,6 @@ mod sequence;
 use abbe_identify::error;
 use abbe_identify::linear::{Linearisation, is_of_interest, prior_u};
 use abbe_identify::noise::ReadingNoise;
-use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_identify::quantity::Given;
 use abbe_model::Diagnostic;
@@ -194,7 +193,7 @@ pub fn global(problem: &Problem, options: &GlobalOptions) -> Result<GlobalAnalys
             linear: if variance > 0.0 { share / variance } else { 0.0 },
         };
         GlobalError {
-            id: list[*j].id.clone(),
+            id: list[*j].id.to_string(),
             unit: list[*j].unit.name.clone(),
             standard_deviation: design.standard_deviation(output) * display,
             linear_standard_deviation: variance.sqrt() * display,
@@ -219,9 +218,10 @@ impl<'p> Plan<'p> {
         let mut inputs = Vec::new();
         let mut used = vec![false; options.vary.len()];
         for (j, parameter) in list.iter().enumerate() {
-            let (Role::Setup, Prior::Gaussian(mut size)) = (parameter.role, parameter.prior) else { continue };
+            let (true, Prior::Gaussian(mut size)) = (parameter.id.is_setup(), parameter.prior) else { continue };
+            let names = [parameter.id.to_string(), parameter.id.clone().with_group("").to_string()];
             for (given, used) in options.vary.iter().zip(&mut used) {
-                if given.id == parameter.id || Some(given.id.as_str()) == parameter.id.split('[').next() {
+                if names.contains(&given.id) {
                     size = given.inside(&parameter.unit)?.abs();
                     *used = true;
                 }
@@ -233,10 +233,10 @@ impl<'p> Plan<'p> {
         let candidates = library::candidates(problem)?;
         for (given, _) in options.vary.iter().zip(&used).filter(|(_, used)| !**used) {
             let Some(candidate) = candidates.iter().find(|candidate| candidate.effect.id() == given.id) else {
-                let uncertain = list.iter().filter(|p| p.role == Role::Setup && prior_u(p).is_some());
+                let uncertain = list.iter().filter(|p| p.id.is_setup() && prior_u(p).is_some());
                 let what = "set-up parameter with an uncertainty and no effect of the library called";
                 let these = "identifiers are as in `bar[A100]` and `EZC~C:h2`; the set-up parameters are:";
-                return Err(error::unknown("the plan", what, &given.id, these, uncertain.map(|p| &p.id)));
+                return Err(error::unknown("the plan", what, &given.id, these, uncertain.map(|p| p.id.clone())));
             };
             let first = truth.parameters.list.len();
             truth.add_effect(&candidate.effect)?;
@@ -342,7 +342,7 @@ impl<'p> Plan<'p> {
     fn reported(&self) -> Vec<GlobalInput> {
         let list = &self.truth.parameters.list;
         let input = |j: usize, distribution: &'static str, size: f64| GlobalInput {
-            id: list[j].id.clone(),
+            id: list[j].id.to_string(),
             distribution,
             size: size * list[j].unit.display_per_internal,
             unit: list[j].unit.name.clone(),
@@ -389,7 +389,7 @@ mod tests {
         let linear = Linearisation::of(&problem, &vec![0.0; problem.parameters.list.len()]).unwrap();
         assert!(!found.errors.is_empty());
         for error in &found.errors {
-            let j = problem.parameters.list.iter().position(|parameter| parameter.id == error.id).unwrap();
+            let j = problem.parameters.list.iter().position(|parameter| parameter.id.to_string() == error.id).unwrap();
             let parts = budget::budget(&problem, &linear, j);
             for (input, index) in found.inputs.iter().zip(&error.indices) {
                 let share = parts.iter().find(|part| part.source == input.id).map_or(0.0, |part| part.share);

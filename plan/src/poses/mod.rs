@@ -36,7 +36,6 @@ use abbe_identify::numerics::median;
 use abbe_identify::numerics::rank::Rank;
 use abbe_identify::numerics::tolerances::MIN_IDENTIFIABLE;
 use abbe_identify::numerics::triangle::Triangle;
-use abbe_identify::parameters::Role;
 use abbe_identify::problem::{Problem, RowBlock};
 use candidates::{PoseLimits, states_of};
 use place::Place;
@@ -211,10 +210,10 @@ pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Resu
             .zip(u)
             .map(|(j, u)| {
                 let parameter = &list[*j];
-                NamedUncertainty { id: parameter.id.clone(), u, unit: parameter.unit.name.clone() }
+                NamedUncertainty { id: parameter.id.to_string(), u, unit: parameter.unit.name.clone() }
             })
             .collect(),
-        held: rank.pivots.iter().map(|j| list[*j].id.clone()).collect(),
+        held: rank.pivots.iter().map(|j| list[*j].id.to_string()).collect(),
         columns: machine.axes.iter().map(|axis| axis.column("")).collect(),
         poses: chosen.iter().map(display).collect(),
         warnings: [
@@ -248,7 +247,7 @@ struct Chosen {
 fn chosen_with(problem: &Problem, rank: Rank, prior: &Mat<f64>, options: &PoseOptions) -> Result<Chosen, Diagnostic> {
     let list = &problem.parameters.list;
     let kept: Vec<usize> = (0..list.len()).filter(|j| !rank.pivots.contains(j)).collect();
-    let (others, of_targets): (Vec<usize>, Vec<usize>) = kept.into_iter().partition(|j| list[*j].role == Role::Setup);
+    let (others, of_targets): (Vec<usize>, Vec<usize>) = kept.into_iter().partition(|j| list[*j].id.is_setup());
     if of_targets.is_empty() {
         return Err(error::no_unknowns());
     }

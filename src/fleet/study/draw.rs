@@ -2,7 +2,7 @@
 
 use abbe_identify::fit;
 use abbe_identify::noise::{Noise as NoiseModel, NoiseSource};
-use abbe_identify::parameters::{Parameter, Role, largest_plausible_share};
+use abbe_identify::parameters::{Parameter, largest_plausible_share};
 use abbe_identify::problem::Problem;
 use abbe_identify::quantity::Given;
 use abbe_identify::results::{Estimate, TraceVerdict};
@@ -132,13 +132,13 @@ impl Study {
         let session = &self.plans[plan];
         let (stated, noise) = (&self.file.effect[effect], &self.file.noise[noise]);
         let mut given: Vec<Given> = Vec::new();
-        for parameter in parameters(session)?.iter().filter(|parameter| parameter.role == Role::Error) {
+        for parameter in parameters(session)?.iter().filter(|parameter| parameter.id.is_error()) {
             let sigma = match parameter.unit.name.as_str() {
                 "arcsec" => self.file.study.location_arcsec.0,
                 _ => self.file.study.location_um.0,
             };
             let normal: f64 = StandardNormal.sample(random);
-            given.push(value(&parameter.id, sigma * normal, &parameter.unit.name));
+            given.push(value(&parameter.id.to_string(), sigma * normal, &parameter.unit.name));
         }
         let locations = given.clone();
         let mut true_effect = None;
@@ -283,11 +283,11 @@ fn coefficients(
     let mut largest = 0.0_f64;
     let mut coefficients: Vec<(String, f64, String)> = Vec::new();
     for parameter in parameters(machine)? {
-        if matches!(parameter.role, Role::Coefficient { effect, .. } if effect == own) {
+        if parameter.coefficient_of() == Some(own) {
             let internal = 1e-3 * random.sample::<f64, _>(StandardNormal);
             largest = largest.max(internal.abs() / parameter.size);
             let number = internal * parameter.unit.display_per_internal;
-            coefficients.push((parameter.id, number, parameter.unit.name));
+            coefficients.push((parameter.id.to_string(), number, parameter.unit.name));
         }
     }
     let scaled = |factor: f64| -> Vec<Given> {

@@ -12,6 +12,7 @@ use abbe_model::document::effect::Effect as EffectDocument;
 use abbe_model::document::fault::{Fault, Within};
 use abbe_model::document::value::Count;
 use abbe_model::effect::Effect;
+use abbe_model::parameter_id::EffectId;
 use abbe_model::session::Session;
 use abbe_trace::TraceOptions;
 use abbe_trace::screening::screened_effects;
@@ -249,8 +250,9 @@ fn searched(effect: &Effect, ids: &HashSet<String>) -> Result<(), Fault> {
     if ids.contains(&id) {
         return Ok(());
     }
+    let own = EffectId::of(effect, 1);
     let mut alike: Vec<&str> = ids.iter().map(String::as_str).collect();
-    alike.retain(|other| other.split(':').next() == id.split(':').next());
+    alike.retain(|other| EffectId::parse(other).is_some_and(|other| other.is_alike(&own)));
     alike.sort_unstable();
     alike.truncate(8);
     let help = match alike.is_empty() {

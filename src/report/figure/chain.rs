@@ -2,6 +2,7 @@
 
 use abbe::model::axis::{Axis, AxisKind};
 use abbe::model::chain::Machine;
+use abbe::model::component::ErrorName;
 use maud::{Markup, html};
 
 use super::scale::text;
@@ -34,12 +35,12 @@ struct Body {
 }
 
 /// The chain with the estimated errors of each axis.
-pub fn figure(machine: &Machine, errors: &[String]) -> Figure {
+pub fn figure(machine: &Machine, errors: &[(&ErrorName, String)]) -> Figure {
     let fixed = |name: &str| Body { name: name.to_string(), axis: None, errors: Vec::new() };
     let moving = machine.axes.iter().map(|axis| Body {
         name: axis.name.clone(),
         axis: Some(axis.clone()),
-        errors: errors.iter().filter(|id| owner(id) == axis.name).cloned().collect(),
+        errors: errors.iter().filter(|(name, _)| name.axis == axis.name).map(|(_, id)| id.clone()).collect(),
     });
     let mut bodies: Vec<Body> = moving.collect();
     bodies.insert(machine.workpiece_side, fixed("bed"));
@@ -118,13 +119,6 @@ impl Kind for Chain {
         columns.push(words("errors"));
         Table::new(columns, rows)
     }
-}
-
-/// Name of the axis of an error or of an effect's component: the text after `EX0` or `EX`.
-fn owner(id: &str) -> &str {
-    let component = id.split('~').next().unwrap_or(id);
-    let rest = component.get(2..).unwrap_or("");
-    rest.strip_prefix('0').unwrap_or(rest)
 }
 
 fn moving(x: f64, y: f64, axis: &Axis) -> Markup {

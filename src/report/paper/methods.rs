@@ -1,7 +1,6 @@
 //! The text of a methods section: machine, tests, parameters, estimation and uncertainty, every number from the result.
 
 use abbe::identify::noise::NoiseSource;
-use abbe::identify::parameters::Role;
 use abbe::model::words::counted;
 
 use super::contents::Study;
@@ -71,7 +70,7 @@ fn machine(study: &Study) -> String {
 
 fn estimation(study: &Study) -> String {
     let list = &study.problem.parameters.list;
-    let setups = list.iter().filter(|parameter| parameter.role == Role::Setup).count();
+    let setups = list.iter().filter(|parameter| parameter.id.is_setup()).count();
     let errors = list.len() - setups;
     let analysis = &study.analysis;
     let rank = if analysis.rank == list.len() {

@@ -5,8 +5,8 @@ pub mod contents;
 pub mod equations;
 pub mod methods;
 
-use abbe::identify::parameters::Role;
 use abbe::identify::problem::Problem;
+use abbe::model::parameter_id::ParameterId;
 
 use super::block::{Body, Report, Text};
 use super::table::Cell;
@@ -68,9 +68,9 @@ pub struct Part {
 impl Part {
     /// The part with words in place of the identifiers of set-up parameters: `spindle_ball.y[S1]` is "spindle ball y (S1)".
     pub fn with_set_up_in_words(mut self, problem: &Problem) -> Part {
-        let set_up = problem.parameters.list.iter().filter(|parameter| parameter.role == Role::Setup);
-        let mut words: Vec<(&str, String)> =
-            set_up.map(|parameter| (parameter.id.as_str(), in_words(&parameter.id))).collect();
+        let set_up = problem.parameters.list.iter().filter(|parameter| parameter.id.is_setup());
+        let mut words: Vec<(String, String)> =
+            set_up.map(|parameter| (parameter.id.to_string(), in_words(&parameter.id))).collect();
         // A longer identifier may contain a shorter one.
         words.sort_by_key(|(id, _)| std::cmp::Reverse(id.len()));
         let replace = |text: &mut String| {
@@ -97,10 +97,7 @@ impl Part {
 }
 
 /// `spindle_ball.y[S1]` as "spindle ball y (S1)".
-fn in_words(id: &str) -> String {
-    let (quantity, group) = match id.strip_suffix(']').and_then(|id| id.split_once('[')) {
-        Some((quantity, group)) => (quantity, format!(" ({group})")),
-        None => (id, String::new()),
-    };
-    quantity.replace(['_', '.'], " ") + &group
+fn in_words(id: &ParameterId) -> String {
+    let quantity = id.clone().with_group("").to_string().replace(['_', '.'], " ");
+    id.group().map_or(quantity.clone(), |group| format!("{quantity} ({group})"))
 }

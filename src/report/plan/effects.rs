@@ -1,5 +1,8 @@
 //! Undeclared effects that the tests of a plan detect, and those that are confounded with the errors.
 
+use std::sync::Arc;
+
+use abbe::model::parameter_id::EffectId;
 use abbe::model::words::first_of;
 use abbe::plan::effects::confounded_by_error;
 use abbe::plan::results::{Detectability, EffectDetectability, EffectsAnalysis};
@@ -66,11 +69,6 @@ pub fn by_error(found: &EffectsAnalysis) -> Table {
     Table::new(["error", "effects"], rows).titled("Effects confounded with each error, the largest bias first")
 }
 
-/// Component and driver of an effect: `EZC~C` of `EZC~C:h2`.
-fn component_and_driver(id: &str) -> &str {
-    id.split_once(':').map_or(id, |(before, _)| before)
-}
-
 /// Of effects with the same component and driver the table lists the one with the largest bias and counts the others.
 fn table<'e>(effects: impl Iterator<Item = &'e EffectDetectability>) -> Table {
     let strongest = |effect: &EffectDetectability| effect.biases.first().map_or(0.0, |bias| bias.per_unit.abs());
@@ -78,14 +76,17 @@ fn table<'e>(effects: impl Iterator<Item = &'e EffectDetectability>) -> Table {
     // Equal rounded values are ordered by name: rounding differs between processors.
     let size = |effect: &EffectDetectability| three_digits(strongest(effect)).parse().unwrap_or(f64::INFINITY);
     sorted.sort_by(|a, b| f64::total_cmp(&size(b), &size(a)).then_with(|| a.id.cmp(&b.id)));
-    let mut chosen: Vec<(&EffectDetectability, usize)> = Vec::new();
+    let mut chosen: Vec<(&EffectDetectability, Option<Arc<EffectId>>, usize)> = Vec::new();
     for effect in sorted {
-        match chosen.iter_mut().find(|(first, _)| component_and_driver(&first.id) == component_and_driver(&effect.id)) {
-            Some((_, alike)) => *alike += 1,
-            None => chosen.push((effect, 0)),
+        let own = EffectId::parse(&effect.id);
+        let is_alike =
+            |first: &Option<Arc<EffectId>>| first.as_ref().zip(own.as_ref()).is_some_and(|(a, b)| a.is_alike(b));
+        match chosen.iter_mut().find(|(_, first, _)| is_alike(first)) {
+            Some((.., alike)) => *alike += 1,
+            None => chosen.push((effect, own, 0)),
         }
     }
-    let rows = chosen.iter().take(MAX_EFFECTS).map(|(effect, alike)| {
+    let rows = chosen.iter().take(MAX_EFFECTS).map(|(effect, _, alike)| {
         let biases = effect.biases.iter().take(2);
         let biases: Vec<String> =
             biases.map(|bias| format!("{} {} {}", bias.id, three_digits(bias.per_unit), unit(&bias.unit))).collect();

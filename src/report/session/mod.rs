@@ -16,11 +16,13 @@ pub mod sky;
 pub mod workspace;
 
 use abbe::identify::fit::Fit;
-use abbe::identify::parameters::Role;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::Estimate;
 use abbe::identify::series::{Cause, correlation};
 use abbe::model::Diagnostic;
+use abbe::model::component::ErrorName;
+use abbe::model::effect::Component;
+use abbe::model::parameter_id::EffectId;
 use serde_json::json;
 
 use self::plots::SessionPlots;
@@ -41,7 +43,7 @@ pub fn add_data(report: &mut Report, session: &SessionPlots<'_>, parameters: &[E
         .map(|k| {
             let share = &session.series.shares[k];
             let is_same = |p: &&Estimate| {
-                p.id == share.id || p.id.strip_prefix(&share.id).is_some_and(|rest| rest.starts_with('.'))
+                p.id == share.id || EffectId::parse(&p.id).is_some_and(|effect| effect.to_string() == share.id)
             };
             let value = parameters.iter().find(is_same).map(|p| {
                 let (value, u) = value_and_u(p.value, p.u);
@@ -138,9 +140,11 @@ pub fn machine(report: &mut Report, problem: &Problem) {
 
 /// The kinematic chain with the estimated errors.
 pub fn chain(problem: &Problem) -> Figure {
-    let list = problem.parameters.list.iter();
-    let mut errors: Vec<String> =
-        list.filter(|parameter| parameter.role == Role::Error).map(|parameter| parameter.id.clone()).collect();
-    errors.extend(problem.parameters.effect_ids.iter().cloned());
+    let errors = problem.parameters.list.iter().filter_map(|parameter| parameter.id.error());
+    let effects = problem.parameters.effect_ids.iter().filter_map(|id| match &id.component {
+        Component::Axis(name) => Some((name, id.to_string())),
+        _ => None,
+    });
+    let errors: Vec<(&ErrorName, String)> = errors.map(|name| (name, name.to_string())).chain(effects).collect();
     chain::figure(&problem.session.machine, &errors)
 }

@@ -34,7 +34,7 @@ fn compared(a: &IdentifiedModel, b: &IdentifiedModel, shared: Option<&str>, plac
 }
 
 fn place(model: &IdentifiedModel, id: &str) -> usize {
-    model.parameters.iter().position(|parameter| parameter.id == id).unwrap_or_else(|| panic!("{id}"))
+    model.parameters.iter().position(|parameter| parameter.id.to_string() == id).unwrap_or_else(|| panic!("{id}"))
 }
 
 /// Value in display units, and that unit's size.
@@ -227,8 +227,9 @@ fn the_volumetric_error_is_that_of_the_chain_on_a_grid() {
         let slots: Vec<usize> = model.parameters[..8]
             .iter()
             .map(|parameter| {
-                let axis = machine.axis_index(&parameter.id[3..]).unwrap();
-                axis * ERRORS_PER_AXIS + "XYZABC".find(&parameter.id[1..2]).unwrap()
+                let id = parameter.id.to_string();
+                let axis = machine.axis_index(&id[3..]).unwrap();
+                axis * ERRORS_PER_AXIS + "XYZABC".find(&id[1..2]).unwrap()
             })
             .collect();
         let errors: Vec<(usize, f64)> =

@@ -101,7 +101,7 @@ fn by(session: &Session, method: Method) -> [f64; 8] {
         problem.tests.iter().map(|test| test.readings.as_ref().unwrap().observed.as_slice()).collect();
     let estimate = estimator.estimate(&problem, &observed).unwrap();
     IDS.map(|id| {
-        let place = estimator.errors.iter().position(|p| problem.parameters.list[*p].id == id);
+        let place = estimator.errors.iter().position(|p| problem.parameters.list[*p].id.to_string() == id);
         place.map_or(f64::NAN, |k| {
             estimate.values[k] * problem.parameters.list[estimator.errors[k]].unit.display_per_internal
         })
@@ -275,7 +275,8 @@ fn uncertainties_of_the_cone_cover_noise_and_set_ups() {
             problem.tests.iter().map(|test| test.readings.as_ref().unwrap().observed.as_slice()).collect();
         let estimate = estimator.estimate(&problem, &observed).unwrap();
         for (k, id) in IDS.iter().enumerate() {
-            let place = estimator.errors.iter().position(|p| problem.parameters.list[*p].id == *id).unwrap();
+            let place =
+                estimator.errors.iter().position(|p| problem.parameters.list[*p].id.to_string() == *id).unwrap();
             let unit = problem.parameters.list[estimator.errors[place]].unit.display_per_internal;
             let u = estimate.covariance[(place, place)].sqrt() * unit;
             squares[k] += ((estimate.values[place] * unit - truth[k]) / u).powi(2) / DRAWS as f64;
@@ -294,7 +295,7 @@ fn one_command_shows_method_and_full_fit_on_the_same_readings() {
     let (problem, full) = prepare(&session, 1).unwrap();
     assert_eq!(comparison.errors.len(), 8);
     for row in &comparison.errors {
-        let place = problem.parameters.list.iter().position(|p| p.id == row.id).unwrap();
+        let place = problem.parameters.list.iter().position(|p| p.id.to_string() == row.id).unwrap();
         let unit = problem.parameters.list[place].unit.display_per_internal;
         assert!((row.full_value.unwrap() - full.beta[place] * unit).abs() < 1e-9);
         // The full fit uses every reading for every error: its uncertainty is not larger.

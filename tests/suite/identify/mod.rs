@@ -16,6 +16,7 @@ pub mod measured;
 pub mod metamorphic;
 pub mod nist;
 pub mod one_answer;
+pub mod parameter_ids;
 pub mod patterns;
 pub mod plausibility;
 pub mod pointing;

@@ -44,7 +44,7 @@ fn measured(plan: &Session, simulation: &Simulation) -> (Session, Vec<Given>) {
 /// Value and uncertainty of a parameter in its display unit.
 fn found(problem: &Problem, fit: &Fit, id: &str) -> (f64, f64) {
     let list = &problem.parameters.list;
-    let place = list.iter().position(|parameter| parameter.id == id).unwrap();
+    let place = list.iter().position(|parameter| parameter.id.to_string() == id).unwrap();
     assert!(fit.rank.is_identifiable(place), "{id} is not identifiable");
     let outside = list[place].unit.display_per_internal;
     (fit.beta[place] * outside, fit.covariance[(place, place)].sqrt() * outside)
@@ -89,8 +89,8 @@ fn pulls_have_mean_0_and_standard_deviation_1_over_200_draws() {
             assert!(list.iter().filter(|p| matches!(p.prior, Prior::Gaussian(_))).count() == 19);
             list.iter()
                 .map(|parameter| {
-                    let Given { value, .. } = truth.iter().find(|known| known.id == parameter.id).unwrap();
-                    let (estimate, u) = found(&problem, &fit, &parameter.id);
+                    let Given { value, .. } = truth.iter().find(|known| known.id == parameter.id.to_string()).unwrap();
+                    let (estimate, u) = found(&problem, &fit, &parameter.id.to_string());
                     (estimate - value) / u
                 })
                 .collect()

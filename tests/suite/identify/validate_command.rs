@@ -6,7 +6,6 @@ use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::base::{Gauge, base_parameters, report};
 use abbe::identify::fit::prepare;
 use abbe::identify::model_file::{IdentifiedModel, Provenance};
-use abbe::identify::parameters::Role;
 use abbe::model::session::Session;
 use abbe::trace::validate::validate;
 use serde_json::{Value, json};
@@ -173,7 +172,7 @@ fn ur10_base_parameters_and_series_b() {
         assert!(base.prediction_change_mm < 1e-9, "{gauge:?}: {:e}", base.prediction_change_mm);
     }
     let base = report(&problem, &fit).unwrap();
-    let is_error = |id: &str| problem.parameters.list.iter().any(|p| p.id == id && p.role == Role::Error);
+    let is_error = |id: &str| problem.parameters.list.iter().any(|p| p.id.is_error() && p.id.to_string() == id);
     let errors = base.parameters.iter().filter(|parameter| is_error(&parameter.id));
     let errors: Vec<_> = errors.collect();
     assert!(errors.len() <= 30 && errors.iter().all(|parameter| parameter.u > 0.0), "{}", errors.len());
@@ -199,6 +198,6 @@ fn kuka_base_parameters() {
         assert!(base.prediction_change_mm < 1e-9, "{gauge:?}: {:e}", base.prediction_change_mm);
     }
     let base = report(&problem, &fit).unwrap();
-    let is_error = |id: &str| problem.parameters.list.iter().any(|p| p.id == id && p.role == Role::Error);
+    let is_error = |id: &str| problem.parameters.list.iter().any(|p| p.id.is_error() && p.id.to_string() == id);
     assert!(base.parameters.iter().filter(|parameter| is_error(&parameter.id)).count() <= 30);
 }

@@ -48,5 +48,5 @@ pub fn linearised(session: &Session) -> (Vec<String>, Linearisation) {
     let problem = states::problem_by_test(&complete, noise_um(session.noise_mm.unwrap_or(3e-4) * 1e3)).unwrap();
     let list = &problem.parameters.list;
     let linear = Linearisation::of(&problem, &vec![0.0; list.len()]).unwrap();
-    (list.iter().map(|parameter| parameter.id.clone()).collect(), linear)
+    (list.iter().map(|parameter| parameter.id.to_string()).collect(), linear)
 }

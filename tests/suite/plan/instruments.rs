@@ -134,7 +134,7 @@ fn check(case: &Case) {
         let (problem, fit) = prepare(&measured(&plan, case, seed as u64), 1).unwrap();
         for ((begin, truth), pulls) in case.lacks.iter().zip(&mut pulls) {
             let (id, u) = of(&with, begin);
-            let place = problem.parameters.list.iter().position(|parameter| parameter.id == id).unwrap();
+            let place = problem.parameters.list.iter().position(|parameter| parameter.id.to_string() == id).unwrap();
             let u = u / problem.parameters.list[place].unit.display_per_internal;
             pulls.push((fit.beta[place] - truth) / u);
         }

@@ -5,7 +5,6 @@
 
 use abbe_identify::fit::aliases_at_solution;
 use abbe_identify::fit::families::FoldEquations;
-use abbe_identify::parameters::Role;
 use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 
@@ -51,8 +50,7 @@ pub(super) fn find(model: &mut PoseSearch, library: &Library<'_>, interrupt: Int
 /// Whether a parameter is a coefficient of the `k`-th found effect.
 fn is_own(model: &PoseSearch, k: usize, parameter: usize) -> bool {
     let first = model.problem.parameters.effects.len() - model.effects.len();
-    let role = model.problem.parameters.list[parameter].role;
-    matches!(role, Role::Coefficient { effect, .. } if effect == first + k)
+    model.problem.parameters.list[parameter].coefficient_of() == Some(first + k)
 }
 
 /// The parameters of the fit with the coefficients of the `k`-th found effect at zero.

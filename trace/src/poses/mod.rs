@@ -17,7 +17,6 @@ mod single_effects;
 use abbe_identify::error::{INTERRUPTED, NO_CONVERGENCE};
 use abbe_identify::fit::families::FoldEquations;
 use abbe_identify::fit::{Fit, NearMinimum, prepare_with, with_families_linearised};
-use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
@@ -291,10 +290,7 @@ fn remove_needless(
         interrupt.check()?;
         let (problem, list) = (&model.problem, &model.problem.parameters.list);
         let first = declared.0.parameters.effects.len();
-        let found = |j: usize| match list[j].role {
-            Role::Coefficient { effect, .. } => effect.checked_sub(first),
-            Role::Error | Role::Setup | Role::Number { .. } => None,
-        };
+        let found = |j: usize| list[j].coefficient_of().and_then(|effect| effect.checked_sub(first));
         // A parameter that is left out keeps its value, which is zero then.
         let beta: Vec<f64> =
             model.near.beta.iter().enumerate().map(|(j, b)| if found(j).is_some() { 0.0 } else { *b }).collect();

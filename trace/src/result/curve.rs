@@ -5,7 +5,6 @@
 
 use abbe_identify::fit::Fit;
 use abbe_identify::fit::contribution_beside_noise;
-use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::CurvePoint;
 use abbe_model::driver::{Driver, DriverSample};
@@ -90,7 +89,7 @@ pub(super) fn curve_of(problem: &Problem, fit: &Fit, number: usize) -> Vec<Curve
         return Vec::new();
     };
     let places: Vec<usize> = (0..problem.parameters.list.len())
-        .filter(|j| matches!(problem.parameters.list[*j].role, Role::Coefficient { effect, .. } if effect == number))
+        .filter(|j| problem.parameters.list[*j].coefficient_of() == Some(number))
         .collect();
     let Some(first) = places.first() else {
         return Vec::new();
@@ -171,8 +170,7 @@ mod tests {
         }
 
         // The splines sum to one: an alias that changes all coefficients by 1 µm changes the curve by 1 µm.
-        let of_curve =
-            |j: usize| matches!(problem.parameters.list[j].role, Role::Coefficient { effect, .. } if effect == number);
+        let of_curve = |j: usize| problem.parameters.list[j].coefficient_of() == Some(number);
         let alias: Vec<f64> = (0..fit.beta.len()).map(|j| if of_curve(j) { 1e-3 } else { 0.0 }).collect();
         let alias = AliasChange { alias: 0, changes: alias, delta_chi2: 0.0 };
         fit.aliases = vec![EffectAliases { effect: number, aliases: vec![alias] }];

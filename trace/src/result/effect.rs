@@ -1,7 +1,7 @@
 //! Results of a found effect: name, numbers of the shape, parameters, curve.
 
 use abbe_identify::fit::Fit;
-use abbe_identify::parameters::{Parameter, Role};
+use abbe_identify::parameters::Parameter;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{
     AliasResult, EffectName, EffectResult, Estimate, LargestOrder, PriorResult, ShapeParameter,
@@ -10,6 +10,7 @@ use abbe_model::Diagnostic;
 use abbe_model::chain::Machine;
 use abbe_model::effect::description::{explanations, meaning};
 use abbe_model::effect::{Effect, Shape};
+use abbe_model::parameter_id::ParameterId;
 use abbe_model::session::Prior;
 use faer::Mat;
 
@@ -165,7 +166,7 @@ pub(super) fn described(
 
 /// The prior of the coefficients of the `number`-th effect; `None` without one.
 fn prior_of(problem: &Problem, fit: &Fit, number: usize) -> Option<PriorResult> {
-    let own = |parameter: &&Parameter| matches!(parameter.role, Role::Coefficient { effect, .. } if effect == number);
+    let own = |parameter: &&Parameter| parameter.coefficient_of() == Some(number);
     let first = problem.parameters.list.iter().find(own)?;
     let Prior::Gaussian(scale) = first.prior else { return None };
     let effect = &problem.parameters.effects[number];
@@ -182,7 +183,7 @@ fn prior_of(problem: &Problem, fit: &Fit, number: usize) -> Option<PriorResult> 
 /// The order of a spectrum with the largest amplitude; `None` for other shapes and for a single order.
 fn largest_order(problem: &Problem, fit: &Fit, number: usize) -> Option<LargestOrder> {
     let Shape::Spectrum(spectrum) = problem.parameters.effects[number].shape else { return None };
-    let own = |parameter: &Parameter| matches!(parameter.role, Role::Coefficient { effect, .. } if effect == number);
+    let own = |parameter: &Parameter| parameter.coefficient_of() == Some(number);
     let first = problem.parameters.list.iter().position(own)?;
     let display = problem.parameters.list[first].unit.display_per_internal;
     let squares: Vec<f64> =
@@ -202,11 +203,9 @@ fn largest_order(problem: &Problem, fit: &Fit, number: usize) -> Option<LargestO
 
 /// The parameters of the `number`-th effect.
 fn parameters_of(problem: &Problem, parameters: &[Estimate], number: usize) -> Vec<Estimate> {
-    let Some(id) = problem.parameters.effect_ids.get(number) else {
-        return Vec::new();
-    };
+    let effect = problem.parameters.effect_ids.get(number);
     let is_own =
-        |p: &&Estimate| p.id.strip_prefix(id.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+        |p: &&Estimate| p.id.parse::<ParameterId>().is_ok_and(|id| id.effect().is_some() && id.effect() == effect);
     parameters.iter().filter(is_own).cloned().collect()
 }
 
@@ -226,14 +225,10 @@ fn shape_parameters_of(problem: &Problem, effect: &Effect, of_positions: &[Optio
 /// Effective number of parameters of an effect with a prior: `m − Σ C_jj/τ²`. `None` for an effect without one.
 pub(crate) fn effective_parameters(problem: &Problem, covariance: &Mat<f64>, effect: usize) -> Option<f64> {
     let mut effective = 0.0;
-    for (j, parameter) in problem.parameters.list.iter().enumerate() {
-        match (parameter.role, parameter.prior) {
-            (Role::Coefficient { effect: of, .. }, Prior::Gaussian(scale)) if of == effect => {
-                effective += 1.0 - (covariance[(j, j)] / (scale * scale)).min(1.0);
-            }
-            (Role::Coefficient { effect: of, .. }, _) if of == effect => return None,
-            _ => {}
-        }
+    let list = problem.parameters.list.iter().enumerate();
+    for (j, parameter) in list.filter(|(_, parameter)| parameter.coefficient_of() == Some(effect)) {
+        let Prior::Gaussian(scale) = parameter.prior else { return None };
+        effective += 1.0 - (covariance[(j, j)] / (scale * scale)).min(1.0);
     }
     Some(effective)
 }

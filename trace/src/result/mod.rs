@@ -9,7 +9,6 @@ mod rejected;
 mod verdict;
 
 use abbe_identify::fit::{self, Fit, JudgedBy, prepare_with};
-use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{EffectResult, Estimate, ParameterChange, TraceResult};
 use abbe_model::Diagnostic;
@@ -190,7 +189,7 @@ fn searched_families(search: &SearchState<'_>, families: &[library::Family]) -> 
 fn presumed(search: &SearchState<'_>, before: &Problem) -> Result<Vec<String>, Diagnostic> {
     let list = &before.parameters.list;
     let declared = search.model_of(&[], &search.selection.branches[ALL].folds)?;
-    let mut found: Vec<(Vec<&str>, Vec<String>)> = Vec::new();
+    let mut found: Vec<(Vec<String>, Vec<String>)> = Vec::new();
     for (number, candidate) in search.candidates.iter().enumerate().filter(|(_, own)| own.tuned_on.is_empty()) {
         let effect = &candidate.effect;
         let (Shape::Precession(_), Component::Axis(name)) = (&effect.shape, &effect.component) else { continue };
@@ -199,21 +198,20 @@ fn presumed(search: &SearchState<'_>, before: &Problem) -> Result<Vec<String>, D
         if !has_signal || (0..d.nrows()).any(|k| d[(k, k)] > CONTAINED * own[(k, k)]) {
             continue;
         }
-        let is_of_axis = |id: &str| {
-            ErrorName::parse(id).is_some_and(|error| {
-                error.kind == ErrorKind::Location
-                    && error.axis == name.axis
-                    && error.freedom.is_angle() == name.freedom.is_angle()
-            })
+        let is_of_axis = |error: &&ErrorName| {
+            error.kind == ErrorKind::Location
+                && error.axis == name.axis
+                && error.freedom.is_angle() == name.freedom.is_angle()
         };
-        let errors: Vec<&str> = list.iter().map(|own| own.id.as_str()).filter(|id| is_of_axis(id)).collect();
+        let errors = list.iter().filter_map(|own| own.id.error()).filter(is_of_axis);
+        let errors: Vec<String> = errors.map(ToString::to_string).collect();
         match found.iter_mut().find(|(same, _)| *same == errors) {
             _ if errors.is_empty() => {}
             Some((_, precessions)) => precessions.push(effect.id()),
             None => found.push((errors, vec![effect.id()])),
         }
     }
-    let words = |(errors, precessions): &(Vec<&str>, Vec<String>)| {
+    let words = |(errors, precessions): &(Vec<String>, Vec<String>)| {
         format!("{} presume that there is no {}", listed(errors, "and"), listed(precessions, "or"))
     };
     Ok(found.iter().map(words).collect())
@@ -376,7 +374,7 @@ fn with_aliases(
 /// `bᵀ C⁻¹ b` with the covariance `C` of its coefficients `b`.
 fn explained(problem: &Problem, fit: &Fit, number: usize) -> f64 {
     let list = &problem.parameters.list;
-    let own = |j: &usize| matches!(list[*j].role, Role::Coefficient { effect, .. } if effect == number);
+    let own = |j: &usize| list[*j].coefficient_of() == Some(number);
     let own: Vec<usize> = (0..list.len()).filter(own).collect();
     let size = |k: usize| list[own[k]].size;
     let covariance = Mat::from_fn(own.len(), own.len(), |i, k| fit.covariance[(own[i], own[k])] / (size(i) * size(k)));

@@ -6,7 +6,6 @@
 //! confounding margin keep their order.
 
 use abbe_identify::heldout::{LeftOutTests, left_out_tests};
-use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
@@ -115,8 +114,8 @@ fn predicted_mm(
         } else {
             problem.add_effect(&effect.alone())?;
             let own = after.parameters.list.iter().zip(&findings.after_fit.beta);
-            let is_own = |role: Role| matches!(role, Role::Coefficient { effect, .. } if effect == number);
-            beta.extend(own.filter(|(parameter, _)| is_own(parameter.role)).map(|(_, value)| value));
+            let own = own.filter(|(parameter, _)| parameter.coefficient_of() == Some(number));
+            beta.extend(own.map(|(_, value)| value));
         }
     }
     let mut left_out = left_out_tests(&problem, &beta)?;

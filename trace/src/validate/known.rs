@@ -7,7 +7,6 @@ use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::noise::outliers;
 use abbe_identify::noise::{Noise, NoiseSource, ShownNoise};
 use abbe_identify::numerics::triangle::Triangle;
-use abbe_identify::parameters::Role;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::Estimate;
 use abbe_identify::results::validation::RmsResult;
@@ -17,7 +16,6 @@ use abbe_model::session::Prior;
 use abbe_model::session::Session;
 use abbe_model::session::limits::MIN_UM;
 
-use super::is_set_up;
 use crate::noise_model::estimate_noise_model;
 
 /// Maximum number of rounds that re-estimate noise and outliers.
@@ -87,24 +85,20 @@ impl<'m> KnownErrors<'m> {
         session: &Session,
         anew: &[ErrorName],
     ) -> Result<KnownErrors<'m>, Diagnostic> {
-        let is_anew = |j: &usize| {
-            let parameter = &model.parameters[*j];
-            parameter.role == Role::Error && anew.iter().any(|name| name.to_string() == parameter.id)
-        };
+        let is_anew = |j: &usize| model.parameters[*j].id.error().is_some_and(|name| anew.contains(name));
         let carried = model.carried_parameters();
         if let Some(name) =
-            anew.iter().find(|name| !carried.iter().any(|j| model.parameters[*j].id == name.to_string()))
+            anew.iter().find(|name| !carried.iter().any(|j| model.parameters[*j].id.error() == Some(name)))
         {
-            let errors =
-                carried.iter().map(|j| &model.parameters[*j]).filter(|parameter| parameter.role == Role::Error);
+            let errors = carried.iter().map(|j| &model.parameters[*j]).filter(|parameter| parameter.id.is_error());
             let (what, these) = ("error to estimate anew", "its location errors are:");
-            let known = errors.map(|parameter| &parameter.id);
+            let known = errors.map(|parameter| parameter.id.clone());
             return Err(error::unknown("the model", what, name.to_string(), these, known));
         }
         let (noise, noise_source) = first_noise(model, session)?;
         let mut full = Problem::new(&model.session(session), noise.clone(), 1)?;
         // The uncertainty of the model contains the priors of its coefficients.
-        full.parameters.list.iter_mut().filter(|p| !is_set_up(p.role)).for_each(|p| p.prior = Prior::Free);
+        full.parameters.list.iter_mut().filter(|p| !p.id.is_setup()).for_each(|p| p.prior = Prior::Free);
         let mut unknowns = anew.to_vec();
         unknowns.sort();
         unknowns.dedup();
@@ -113,15 +107,14 @@ impl<'m> KnownErrors<'m> {
         let carried: Vec<usize> = carried.into_iter().filter(|j| !is_anew(j)).collect();
         let effects: Vec<usize> = model.carried_effects().collect();
         let column = |j: &usize| {
-            full.parameters.list.iter().position(|parameter| match (model.parameters[*j].role, parameter.role) {
-                (Role::Error, Role::Error) => model.parameters[*j].id == parameter.id,
-                (Role::Coefficient { effect, coefficient }, Role::Coefficient { effect: of, coefficient: k }) => {
-                    effects.get(of) == Some(&effect) && coefficient == k
+            let wanted = &model.parameters[*j];
+            // Effects that differ only in the numbers of their shapes may be numbered otherwise in the model.
+            full.parameters.list.iter().position(|own| match own.effect {
+                Some(effect) => {
+                    effects.get(effect).copied() == wanted.effect
+                        && (own.index, own.id.is_number()) == (wanted.index, wanted.id.is_number())
                 }
-                (Role::Number { effect, number }, Role::Number { effect: of, number: k }) => {
-                    effects.get(of) == Some(&effect) && number == k
-                }
-                _ => false,
+                None => own.id == wanted.id,
             })
         };
         let columns: Option<Vec<usize>> = carried.iter().map(column).collect();
@@ -154,7 +147,7 @@ impl<'m> KnownErrors<'m> {
     pub fn location_values(&self) -> Vec<f64> {
         let value = |j: &usize| {
             let own = |(name, _): &&(abbe_model::component::ErrorName, f64)| {
-                self.model.parameters[*j].role == Role::Error && name.to_string() == self.model.parameters[*j].id
+                self.model.parameters[*j].id.error() == Some(name)
             };
             self.model.locations.iter().find(own).map_or(0.0, |(_, value)| *value)
         };
@@ -163,9 +156,9 @@ impl<'m> KnownErrors<'m> {
 
     /// The values of the model without an effect.
     pub fn values_without(&self, effect: usize) -> Vec<f64> {
-        let value = |j: &usize| match self.model.parameters[*j].role {
-            Role::Coefficient { effect: of, .. } if of == effect => 0.0,
-            _ => self.model.parameters[*j].value,
+        let value = |j: &usize| match &self.model.parameters[*j] {
+            own if own.effect == Some(effect) && own.id.is_coefficient() => 0.0,
+            own => own.value,
         };
         self.carried.iter().map(value).collect()
     }
@@ -173,7 +166,7 @@ impl<'m> KnownErrors<'m> {
     /// The identifier of an effect of the model.
     pub fn effect_id(&self, effect: usize) -> String {
         let place = self.model.carried_effects().position(|carried| carried == effect);
-        place.and_then(|place| self.full.parameters.effect_ids.get(place)).cloned().unwrap_or_default()
+        place.and_then(|place| self.full.parameters.effect_ids.get(place)).map(ToString::to_string).unwrap_or_default()
     }
 
     /// The problem of the set-up with these errors of the machine.
@@ -330,7 +323,7 @@ impl<'m> KnownErrors<'m> {
             let display = parameter.unit.display_per_internal;
             let u = covariance[(j, j)].max(0.0).sqrt() * display;
             let meaning = abbe_identify::parameter_description::parameter_meaning(&problem, j, None);
-            Estimate::new(&parameter.id, beta[j] * display, u, &parameter.unit.name).with_meaning(meaning)
+            Estimate::new(parameter.id.clone(), beta[j] * display, u, &parameter.unit.name).with_meaning(meaning)
         });
         Ok(estimate.collect())
     }

@@ -21,7 +21,6 @@ mod verdict;
 
 use abbe_identify::model_file::{IdentifiedModel, range};
 use abbe_identify::noise::ReadingNoise;
-use abbe_identify::parameters::Role;
 use abbe_identify::results::validation::{
     ModelNotJudged, MovedParameter, RmsResult, ValidatedModel, ValidationResult, WithoutResult,
 };
@@ -202,11 +201,6 @@ impl Judged {
     fn is_consistent(&self) -> bool {
         self.moved.is_empty() && self.prediction.is_as_predicted()
     }
-}
-
-/// Whether a parameter belongs to the set-up.
-fn is_set_up(role: Role) -> bool {
-    role == Role::Setup
 }
 
 #[cfg(test)]

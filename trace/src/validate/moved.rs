@@ -67,7 +67,7 @@ pub(super) fn moved(known: &KnownErrors<'_>, at: &Linearised) -> Result<Vec<Move
         let others: Vec<usize> = selected.iter().copied().filter(|j| j != i).collect();
         alternatives.push(alternatives_of(*i, &separate(&p, &y, &others, &candidates)?));
     }
-    let id = |i: usize| known.model.parameters[known.carried[i]].id.clone();
+    let id = |i: usize| known.model.parameters[known.carried[i]].id.to_string();
     let mut moved: Vec<MovedParameter> = selected
         .iter()
         .zip(&changes)

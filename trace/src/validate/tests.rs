@@ -32,7 +32,7 @@ fn a_change_is_the_difference_of_two_fits() {
     let (first, second) = (session(&["C100"]), session(&["C150"]));
     let mut moved = model(&first);
     let other = model(&second);
-    let place = |model: &IdentifiedModel| model.parameters.iter().position(|p| p.id == "EX0C").unwrap();
+    let place = |model: &IdentifiedModel| model.parameters.iter().position(|p| p.id.to_string() == "EX0C").unwrap();
     let (i, j) = (place(&moved), place(&other));
     moved.parameters[i].value += 30.0 * moved.u(i).hypot(other.u(j));
     let known_noise = KnownErrors::new(&moved, &second, &[]).unwrap();
@@ -84,7 +84,7 @@ fn a_session_that_the_model_does_not_affect_is_refused() {
     second.tests.iter_mut().for_each(|test| test.readings = None);
     assert_eq!(validate(&model, &second).err(), Some(error::no_readings()));
     let mut empty = model.clone();
-    empty.parameters.retain(|parameter| is_set_up(parameter.role));
+    empty.parameters.retain(|parameter| parameter.id.is_setup());
     let error = validate(&empty, &session(&["A100"])).err().unwrap().to_string();
     assert!(error.contains("nothing in common"), "{error}");
 }

@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use abbe_identify::noise::{Noise, NoiseSource};
-use abbe_identify::parameters::Role;
+use abbe_identify::parameters::Parameter;
 use abbe_identify::problem::Problem;
 use abbe_model::driver::Driver;
 use abbe_model::effect::Effect;
@@ -59,17 +59,17 @@ pub fn changes(mut session: Session, effects: &[Effect]) -> Changes {
     let list = &problem.parameters.list;
     let mut beta = vec![0.0; list.len()];
     let without = read(&beta);
-    let mounted = list.iter().filter(|parameter| matches!(parameter.role, Role::Setup));
-    let mounted = mounted.map(|parameter| parameter.id.clone()).collect();
-    let mut columns = |wanted: &dyn Fn(Role) -> bool| {
+    let mounted = list.iter().filter(|parameter| parameter.id.is_setup());
+    let mounted = mounted.map(|parameter| parameter.id.to_string()).collect();
+    let mut columns = |wanted: &dyn Fn(&Parameter) -> bool| {
         let mut found = Vec::new();
         for (place, parameter) in list.iter().enumerate() {
-            if wanted(parameter.role) {
+            if wanted(parameter) {
                 // Slopes over a linear axis count at 100 mm, as other powers do.
                 let follows_axis = |effect: usize| matches!(problem.parameters.effects[effect].driver, Driver::Axis(_));
-                let is_slope = parameter.unit.name.ends_with("/m")
-                    && matches!(parameter.role, Role::Coefficient { effect, .. } if follows_axis(effect));
-                let unit = match (parameter.id.starts_with("gain"), is_slope) {
+                let is_slope =
+                    parameter.unit.name.ends_with("/m") && parameter.coefficient_of().is_some_and(follows_axis);
+                let unit = match (parameter.id.to_string().starts_with("gain"), is_slope) {
                     (true, _) => 1e3,
                     (false, true) => 10.0,
                     (false, false) => 1.0,
@@ -82,10 +82,9 @@ pub fn changes(mut session: Session, effects: &[Effect]) -> Changes {
         }
         DMatrix::from_vec(without.len(), found.len() / without.len(), found)
     };
-    let setup = columns(&|role| matches!(role, Role::Setup));
-    let of_effects = (0..effects.len())
-        .map(|wanted| columns(&|role| matches!(role, Role::Coefficient { effect, .. } if effect == wanted)))
-        .collect();
+    let setup = columns(&|parameter| parameter.id.is_setup());
+    let of_effects =
+        (0..effects.len()).map(|wanted| columns(&|parameter| parameter.coefficient_of() == Some(wanted))).collect();
     let mut at = Vec::new();
     for (test, model) in problem.models.iter().enumerate() {
         let readings = problem.tests[test].readings.as_ref().unwrap();

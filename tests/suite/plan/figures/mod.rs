@@ -107,7 +107,7 @@ impl Columns {
     fn of(session: &Session) -> Columns {
         let complete = states::complete(session, true).unwrap();
         let problem = states::problem_by_test(&complete, noise_um(NOISE_UM)).unwrap();
-        let own: Vec<Own> = problem.parameters.list.iter().map(|parameter| own(&parameter.id)).collect();
+        let own: Vec<Own> = problem.parameters.list.iter().map(|parameter| own(&parameter.id.to_string())).collect();
         let tests = simulated(session, &own[0].id, 0.0, own[0].unit);
         let tests: Vec<usize> = (0..).zip(&tests).flat_map(|(test, values)| values.iter().map(move |_| test)).collect();
         let columns: Vec<DVector<f64>> = own.iter().map(|own| column(session, own, tests.len())).collect();

@@ -119,7 +119,7 @@ pub fn candidates(problem: &Problem) -> Result<Vec<LibraryEffect>, Diagnostic> {
             }
         }
     }
-    let declared: Vec<String> = problem.parameters.list.iter().map(|parameter| parameter.id.clone()).collect();
+    let declared: Vec<String> = problem.parameters.list.iter().map(|parameter| parameter.id.to_string()).collect();
     candidates.retain(|candidate| {
         let constant = candidate.effect.shape == Shape::Constant;
         let same_error = constant && declared.contains(&candidate.effect.component.to_string());
