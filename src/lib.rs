@@ -86,8 +86,9 @@ pub mod prelude {
     pub use abbe_codegen::{Equation, Options as EquationOptions, Order, SessionTest, check, language};
     pub use abbe_files::read::add_node;
     pub use abbe_files::table::memory::MemoryColumn;
+    pub use abbe_identify::fit::FitResult;
     pub use abbe_identify::quantity::Given;
-    pub use abbe_identify::results::{Estimate, FitResult, TraceResult};
+    pub use abbe_identify::results::Estimate;
     pub use abbe_identify::simulate::{Simulated, Simulation, simulate};
     pub use abbe_model::Diagnostic;
     pub use abbe_model::chain::Machine;
@@ -96,6 +97,7 @@ pub mod prelude {
     pub use abbe_model::session::Session;
     pub use abbe_plan::{PlanOptions, analyse};
     pub use abbe_trace::SessionFit;
+    pub use abbe_trace::result::TraceResult;
     pub use abbe_trace::{Progress, TraceOptions, TraceOutcome, trace};
 
     /// Reads a session file and the machine and data that it names.

@@ -1,30 +1,15 @@
-//! What `fit` and `trace` report, as JSON has it. Units stand in the names, or beside the value.
+//! What a model and the statements about it are, as JSON has them. Units stand in the names, or beside the value.
 
-mod base;
 mod cross_validation;
-mod monte_carlo;
 mod outcome;
 mod parameter;
-mod pointing;
 mod statements;
-mod trace;
-pub mod validation;
-
-use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::circular::CircularTest;
 use crate::noise::ReadingNoise;
-use crate::plausibility::Plausibility;
-use crate::positioning::PositioningTest;
-use crate::positioning::diagonal::{DiagonalTest, LargestOfDiagonals};
-use crate::straightness::StraightnessTest;
-use crate::tolerance::Conformity;
-pub use base::BaseResult;
 pub use cross_validation::{CrossValidation, TestNotLeftOut};
-pub use monte_carlo::{DrawnParameter, FitMonteCarlo, Verdict};
 pub use outcome::{
     Assumption, AssumptionKind, AssumptionVerdict, DataRange, DeterminedByPrior, Goodness, GoodnessVerdict,
     NotEstimated, NotJudged, Outcome, TraceVerdict,
@@ -34,14 +19,7 @@ pub use parameter::{
     Combination, Covariance, DeterminedBy, EnlargedBy, Estimate, Finding, Interval, MeasuredValue, NullSpace,
     ParameterChange, Unobservable,
 };
-pub use pointing::{PointingTerm, PointingTerms};
-pub use statements::{
-    AxisCorrection, GoodStatement, LineQuantity, MeasureStatement, NextStep, Statements, ValidationStatement,
-};
-pub use trace::{
-    AliasResult, AlternativeResult, CurvePoint, EffectName, EffectResult, LargestOrder, PriorResult, RejectedCandidate,
-    Remainder, SeparatingTestResult, SeparationResult, ShapeParameter, TraceResult,
-};
+pub use statements::{AxisCorrection, GoodStatement, LineQuantity, MeasureStatement, NextStep, Statements};
 
 /// A reading that was excluded as an outlier.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -135,47 +113,4 @@ pub struct ModelResult {
     pub null_space: NullSpace,
     /// Readings excluded as outliers.
     pub outliers: Vec<Outlier>,
-}
-
-/// The fit of a session.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct FitResult {
-    /// The fitted model.
-    #[serde(flatten)]
-    pub model: ModelResult,
-    /// Ball-bar figures of the tests whose path is a circle.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub circular: Vec<CircularTest>,
-    /// Figures of ISO 230-2 of the tests in which a laser or a sensor of angles reads the axis that moves.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub positioning: Vec<PositioningTest>,
-    /// Figures of ISO 230-6 of the tests in which a laser reads along a diagonal.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub diagonals: Vec<DiagonalTest>,
-    /// The largest of them, for body and for face diagonals.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub largest_of_diagonals: Vec<LargestOfDiagonals>,
-    /// Straightness of axes by ISO 230-1, from tests in which one linear axis moves under a laser.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub straightness: Vec<StraightnessTest>,
-    /// Decisions of conformity, if the session states limits.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub conformity: Option<Conformity>,
-    /// Statements of the session that the readings contradict, and what may be wrong.
-    #[serde(flatten)]
-    pub plausibility: Plausibility,
-    /// Warnings in words.
-    pub warnings: Vec<String>,
-    /// Notes of the session file's `[about]`: `serial_number`, `operator`, `date`, `comment` and others.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub about: BTreeMap<String, String>,
-    /// The base parameters, if requested.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub base: Option<BaseResult>,
-    /// The terms of TPOINT, if requested.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub tpoint: Option<PointingTerms>,
-    /// The fit by Monte Carlo, if requested. `u` in `parameters` then is the quoted one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub monte_carlo: Option<FitMonteCarlo>,
 }

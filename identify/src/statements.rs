@@ -19,15 +19,13 @@ use abbe_model::instrument::Contact;
 use abbe_model::parameter_id::ParameterId;
 use abbe_model::unit::Unit;
 
-use crate::fit::doubt_on_unit;
+use crate::fit::{FitResult, doubt_on_unit};
 use crate::linear::is_of_interest;
 use crate::plausibility::{Conflict, ConflictKind, Plausibility, likely_unit};
 use crate::problem::Problem;
-use crate::results::validation::{MovedParameter, ValidationResult, ValidationVerdict};
 use crate::results::{
-    AxisCorrection, Covariance, DeterminedBy, Estimate, Finding, FitResult, GoodStatement, Goodness, GoodnessVerdict,
-    LineQuantity, MeasureStatement, ModelResult, NextStep, NotJudged, Statements, TraceResult, Unobservable,
-    ValidationStatement,
+    AxisCorrection, Covariance, DeterminedBy, Estimate, Finding, GoodStatement, Goodness, GoodnessVerdict,
+    LineQuantity, MeasureStatement, ModelResult, NextStep, NotJudged, Statements, Unobservable,
 };
 use crate::tolerance::Conformity;
 use crate::tolerance::rule::Decision;
@@ -58,62 +56,19 @@ impl Statements {
         Statements::of_model(problem, model, good(model, result.conformity.as_ref()), measure)
     }
 
-    /// Of a trace; `problem` is the model with the found effects.
-    pub fn of_trace(problem: &Problem, result: &TraceResult) -> Statements {
-        let model = &result.after;
-        let separating = result.effects.iter().find_map(|effect| Some((effect, effect.separating_tests.first()?)));
-        let measure = match (separating, &result.plausibility.conflicts[..]) {
-            (Some((effect, test)), []) if !result.interrupted => MeasureStatement {
-                step: NextStep::SeparatingTest,
-                test: (!test.name.is_empty()).then(|| test.name.clone()),
-                description: Some(test.test.clone()),
-                effect: Some(effect.name.meaning.clone()),
-            },
-            _ => {
-                let step = match base_step(&result.plausibility, model.outcome.goodness) {
-                    Some(NextStep::Trace) | None if result.interrupted => NextStep::Trace,
-                    // The search has been made.
-                    Some(NextStep::Trace) | None if !has_candidates(problem) => NextStep::Nothing,
-                    Some(NextStep::Trace) | None if model.unobservable.is_empty() => NextStep::Improve,
-                    Some(NextStep::Trace) | None => NextStep::Identify,
-                    Some(step) => step,
-                };
-                let is_unit = step == NextStep::CheckUnit;
-                let description = in_doubt(problem, &result.plausibility).filter(|_| is_unit);
-                MeasureStatement { description, ..step.into() }
-            }
-        };
-        let good = GoodStatement { verdict: Some(result.verdict), ..good(model, result.conformity.as_ref()) };
-        Statements::of_model(problem, model, good, measure)
-    }
-
-    fn of_model(problem: &Problem, model: &ModelResult, good: GoodStatement, measure: MeasureStatement) -> Statements {
+    /// Of a model, with what is said of its goodness and of the next measurement.
+    pub fn of_model(
+        problem: &Problem,
+        model: &ModelResult,
+        good: GoodStatement,
+        measure: MeasureStatement,
+    ) -> Statements {
         Statements {
             good,
             further: further(problem, &model.parameters),
             correct: corrections(&problem.session.machine, &model.parameters, &model.covariance),
             changed: Vec::new(),
             measure,
-        }
-    }
-}
-
-impl Statements<ValidationStatement, MovedParameter> {
-    /// Of a validation.
-    pub fn of_validation(result: &ValidationResult) -> Self {
-        let step = match result.verdict {
-            _ if result.not_judged.is_some() => NextStep::Trace,
-            ValidationVerdict::Holds => NextStep::Nothing,
-            ValidationVerdict::HoldsInRange => NextStep::WidenRange,
-            ValidationVerdict::Degraded | ValidationVerdict::DoesNotHold => NextStep::Refit,
-        };
-        let ValidationResult { verdict, readings, readings_in_range, .. } = *result;
-        Statements {
-            good: ValidationStatement { verdict, readings, readings_in_range },
-            correct: Vec::new(),
-            changed: result.moved.clone(),
-            further: Vec::new(),
-            measure: step.into(),
         }
     }
 }
@@ -145,7 +100,7 @@ fn is_exhausted(problem: &Problem, unobservable: &[Unobservable]) -> bool {
 }
 
 /// The step that has to come before any further test.
-fn base_step(plausibility: &Plausibility, goodness: Goodness) -> Option<NextStep> {
+pub fn base_step(plausibility: &Plausibility, goodness: Goodness) -> Option<NextStep> {
     match goodness.verdict {
         _ if goodness.not_judged == Some(NotJudged::WrongUnit) => Some(NextStep::CheckUnit),
         _ if !plausibility.conflicts.is_empty() => Some(NextStep::CorrectSession),
@@ -158,7 +113,7 @@ fn base_step(plausibility: &Plausibility, goodness: Goodness) -> Option<NextStep
 }
 
 /// The unit in which readings in doubt likely are.
-fn in_doubt(problem: &Problem, plausibility: &Plausibility) -> Option<String> {
+pub fn in_doubt(problem: &Problem, plausibility: &Plausibility) -> Option<String> {
     let unit = plausibility.conflicts.iter().find(|conflict| conflict.kind == ConflictKind::Unit);
     let likely = |conflict: &Conflict| {
         let likely = likely_unit(conflict.value / conflict.stated, problem.unit());
@@ -167,7 +122,8 @@ fn in_doubt(problem: &Problem, plausibility: &Plausibility) -> Option<String> {
     unit.map(likely).or_else(|| doubt_on_unit(problem))
 }
 
-fn good(model: &ModelResult, conformity: Option<&Conformity>) -> GoodStatement {
+/// Whether a model is good, and what the limits of the session decide.
+pub fn good(model: &ModelResult, conformity: Option<&Conformity>) -> GoodStatement {
     let of = |decision: Decision| -> Vec<String> {
         let items = conformity.iter().flat_map(|conformity| &conformity.items);
         items.filter(|item| item.decision == decision).map(|item| item.id.clone()).collect()

@@ -10,9 +10,9 @@ use crate::error::{NO_CANDIDATE_TEST, TOO_MANY};
 use crate::proposal::{self, proposal};
 use crate::separate::{AlternativeSeparation, SeparatingTest, separating_tests};
 use crate::test_variations::TestVariations;
-use abbe_identify::results::{AlternativeResult, EffectResult, SeparatingTestResult, SeparationResult};
 use abbe_trace::interrupt::Interrupt;
 use abbe_trace::result::effect_name;
+use abbe_trace::result::{AlternativeResult, EffectResult, SeparatingTestResult, SeparationResult};
 use abbe_trace::{Progress, TraceOutcome};
 
 /// Maximum number of aliases that are compared with an effect, the nearest first. Each alias adds columns.

@@ -7,7 +7,6 @@ use std::time::{Duration, Instant};
 use abbe_identify::fit::Fit;
 use abbe_identify::plausibility::accepted;
 use abbe_identify::problem::Problem;
-use abbe_identify::results::Statements;
 use abbe_model::Diagnostic;
 use abbe_plan::attainable;
 use abbe_plan::separating_tests::separate_aliases;
@@ -143,7 +142,7 @@ impl Found for TraceOutcome {
 }
 
 fn stated(found: &TraceOutcome) -> StatedTrace<'_> {
-    let mut statements = Statements::of_trace(&found.after, &found.result);
+    let mut statements = abbe_trace::statements::of_trace(&found.after, &found.result);
     statements.measure.step = attainable(&found.after, statements.measure.step);
     Stated { statements, result: &found.result }
 }

@@ -1,7 +1,6 @@
 //! A saved model against the readings of a session that it never saw.
 
 use abbe_apply::compare::workspace::rms_of_moved;
-use abbe_identify::results::Statements;
 use abbe_model::Diagnostic;
 use abbe_model::component::ErrorName;
 use abbe_trace::validate::{Validation, validate_anew};
@@ -60,7 +59,7 @@ impl Analysis for Validated {
 impl Validated {
     fn stated(&self) -> StatedValidation<'_> {
         let result = &self.validation.result;
-        Stated { statements: Statements::of_validation(result), result }
+        Stated { statements: abbe_trace::statements::of_validation(result), result }
     }
 }
 

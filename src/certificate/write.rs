@@ -2,7 +2,8 @@
 
 use std::io;
 
-use abbe_identify::results::{DeterminedBy, Estimate, FitResult};
+use abbe_identify::fit::FitResult;
+use abbe_identify::results::{DeterminedBy, Estimate};
 use abbe_identify::tolerance::rule::Decision;
 use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName};

@@ -1,8 +1,7 @@
 //! Other forms of the estimates of a fit: base parameters, terms of a pointing model.
 
-use abbe::identify::fit::{Fit, base, tpoint};
+use abbe::identify::fit::{Fit, FitResult, base, tpoint};
 use abbe::identify::problem::Problem;
-use abbe::identify::results::FitResult;
 use abbe::model::Diagnostic;
 use clap::{Args, ValueEnum};
 

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use abbe::files::SourceMap;
-use abbe::identify::results::TraceResult;
 use abbe::model::Diagnostic;
 use abbe::model::chain::Machine;
 use abbe::model::document::edit::SessionText;
 use abbe::model::document::print::Block;
 use abbe::model::document::test::Test;
 use abbe::trace::TraceOutcome;
+use abbe::trace::result::TraceResult;
 
 use super::message::{Kind, tell};
 use super::{SessionArguments, output};

@@ -6,10 +6,10 @@ use abbe_apply::history::events::{ChangeEvent, Compensation, Kind};
 use abbe_apply::history::faults::{Fault, FoundEffect, faults};
 use abbe_apply::history::results::{History, MachineHistory, ParameterHistory};
 use abbe_apply::history::{HistoryOptions, MachineSessions, SessionValues, analyse};
-use abbe_identify::results::validation::ValidationVerdict;
 use abbe_identify::results::{Estimate, MeasuredValue, NextStep, Statements};
 use abbe_model::Diagnostic;
 use abbe_model::parameter_id::ParameterId;
+use abbe_trace::validate::ValidationVerdict;
 use schemars::JsonSchema;
 use serde::Serialize;
 

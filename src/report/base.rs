@@ -1,6 +1,6 @@
 //! Base parameters: a minimal set of numbers that predicts the same readings.
 
-use abbe::identify::results::BaseResult;
+use abbe::identify::fit::base::BaseResult;
 use abbe::model::words::{counted, with_exponent};
 
 use super::number::unit;

@@ -1,6 +1,6 @@
 //! The name of an effect in tables and sentences.
 
-use abbe::identify::results::EffectName;
+use abbe::trace::result::EffectName;
 
 /// An effect by component, driver and shape.
 pub fn name(effect: &EffectName) -> String {

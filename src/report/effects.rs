@@ -1,10 +1,10 @@
 //! Effects that a trace has found, each beside its competing explanations.
 
-use abbe::identify::results::{AliasResult, EffectName, EffectResult, Estimate, SeparatingTestResult, ShapeParameter};
 use abbe::model::parameter_id::ParameterId;
 use abbe::model::words::counted;
 use abbe::trace::TraceOutcome;
 use abbe::trace::alias::CompetingEffect;
+use abbe::trace::result::{AliasResult, EffectName, EffectResult, SeparatingTestResult, ShapeParameter};
 
 use super::block::{Level, Report, Text};
 use super::effect::name;

@@ -3,9 +3,10 @@
 use abbe::document::StatedFit;
 use abbe::identify::circular::CircularTest;
 use abbe::identify::figure::{Definition, Figure};
-use abbe::identify::fit::Fit;
+use abbe::identify::fit::{Fit, FitResult};
 use abbe::identify::problem::Problem;
-use abbe::identify::results::{Estimate, FitMonteCarlo, FitResult, ModelResult, NextStep, Verdict};
+use abbe::identify::propagation::{FitMonteCarlo, Verdict};
+use abbe::identify::results::{Estimate, ModelResult, NextStep};
 use abbe::identify::series::{spectrum, views};
 use abbe::identify::statements::has_candidates;
 use abbe::identify::tolerance::Conformity;

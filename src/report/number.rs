@@ -1,7 +1,7 @@
 //! Numbers and units as people read them: digits by the uncertainty, symbols of units.
 
-use abbe::identify::results::ShapeParameter;
 use abbe::model::unit::Unit;
+use abbe::trace::result::ShapeParameter;
 
 /// A number with decimal places. A number that rounds to zero has no sign.
 pub fn fixed(value: f64, places: usize) -> String {

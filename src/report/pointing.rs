@@ -1,6 +1,6 @@
 //! Terms of a pointing model, and the residual on the sky.
 
-use abbe::identify::results::PointingTerms;
+use abbe::identify::fit::tpoint::PointingTerms;
 
 use super::table::{Cell, Table, cells};
 

@@ -8,10 +8,9 @@ use abbe::apply::compare::results::{Comparison, Difference};
 use abbe::codegen::nc::has_letters;
 #[cfg(feature = "fleet")]
 use abbe::fleet::history::{ChangedInHistory, HistoryStatements};
-use abbe::identify::results::validation::{ModelNotJudged, MovedParameter, ValidationResult, ValidationVerdict};
 use abbe::identify::results::{
     AxisCorrection, DeterminedBy, Estimate, GoodStatement, LineQuantity, MeasureStatement, NextStep, NotJudged,
-    ParameterChange, Statements, ValidationStatement,
+    ParameterChange, Statements,
 };
 use abbe::identify::tolerance::rule::Decision;
 use abbe::model::chain::Machine;
@@ -19,6 +18,7 @@ use abbe::model::session::Session;
 use abbe::model::words::{counted, first_of};
 use abbe::plan::PlanStatement;
 use abbe::plan::results::{Contribution, ErrorAnalysis, PlanAnalysis};
+use abbe::trace::validate::{ModelNotJudged, MovedParameter, ValidationResult, ValidationStatement, ValidationVerdict};
 
 use super::block::Sentence;
 use super::commands::{Commands, MEASURE, NEXT, PROGRAMS, TRACED, TRACED_MODEL};

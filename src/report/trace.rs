@@ -2,14 +2,13 @@
 
 use abbe::document::StatedTrace;
 use abbe::identify::noise::NoiseSource;
-use abbe::identify::results::{
-    EffectResult, GoodnessVerdict, ModelResult, NextStep, NotJudged, PriorResult, TraceResult, TraceVerdict,
-};
+use abbe::identify::results::{GoodnessVerdict, ModelResult, NextStep, NotJudged, TraceVerdict};
 use abbe::identify::series::{spectrum, views};
 use abbe::model::Diagnostic;
 use abbe::model::session::Session;
 use abbe::model::words::counted;
 use abbe::trace::TraceOutcome;
+use abbe::trace::result::{EffectResult, PriorResult, TraceResult};
 
 use super::block::{KeyFigure, Level, Report, Sentence, Text};
 use super::commands::{Commands, TRACED};

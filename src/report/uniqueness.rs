@@ -1,8 +1,8 @@
 //! Uniqueness of the effects of a trace, and the tests that separate them from their aliases, in words for terminal and
 //! report.
 
-use abbe::identify::results::{AliasResult, EffectName, EffectResult, SeparatingTestResult, TraceResult};
 use abbe::model::words::{counted, listed, with_exponent};
+use abbe::trace::result::{AliasResult, EffectName, EffectResult, SeparatingTestResult, TraceResult};
 
 use super::number::of_readings;
 

@@ -1,9 +1,8 @@
 //! A validated model: verdict, residuals of each machine, moved parameters, share of each effect.
 
 use abbe::document::StatedValidation;
-use abbe::identify::results::validation::{JudgedResidual, RmsResult, ValidationResult, ValidationVerdict};
 use abbe::model::words::counted;
-use abbe::trace::validate::Validation;
+use abbe::trace::validate::{JudgedResidual, RmsResult, Validation, ValidationResult, ValidationVerdict};
 
 use super::block::{KeyFigure, Report, Text};
 use super::commands::Commands;

@@ -1,7 +1,6 @@
 //! Figures of a validation: rms of each machine, residuals and coverage of each test, share of each effect.
 
-use abbe::identify::results::validation::ValidationResult;
-use abbe::trace::validate::Validation;
+use abbe::trace::validate::{Validation, ValidationResult};
 
 use crate::report::figure::bars::{Bars, Fill};
 use crate::report::figure::lines::{Axis, Lines, Mark, Series};

@@ -1,14 +1,12 @@
 //! A model that is traced on a first session predicts a second one, with other radii, another set-up and other noise.
 
-use abbe::identify::results::validation::ValidationVerdict;
+use abbe::trace::validate::{ValidationResult, ValidationVerdict, validate};
 use std::path::Path;
 
 use abbe::files::Source;
 use abbe::files::{ReadOptions, session};
 use abbe::identify::model_file::{IdentifiedModel, Provenance, of_source};
-use abbe::identify::results::validation::ValidationResult;
 use abbe::model::session::Session;
-use abbe::trace::validate::validate;
 use abbe::trace::{TraceOptions, trace};
 use rand::RngExt;
 use rayon::prelude::*;

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use abbe::files::{ReadOptions, session};
 use abbe::identify::fit::{prepare, report};
-use abbe::identify::results::{EffectName, GoodnessVerdict, TraceResult, TraceVerdict};
+use abbe::identify::results::{GoodnessVerdict, TraceVerdict};
+use abbe::trace::result::{EffectName, TraceResult};
 use rayon::prelude::*;
 
 use super::judging::short;

@@ -2,7 +2,7 @@
 //! temperature collinear with time.
 
 use abbe::files::{ReadOptions, session};
-use abbe::identify::results::{EffectName, EffectResult};
+use abbe::trace::result::{EffectName, EffectResult};
 use abbe::trace::{TraceOptions, trace};
 use nalgebra::Vector3;
 use rand::RngExt;

@@ -1,6 +1,7 @@
 //! Compares a result of trace with the true effects.
 
-use abbe::identify::results::{EffectName, EffectResult, ModelResult, ShapeParameter};
+use abbe::identify::results::ModelResult;
+use abbe::trace::result::{EffectName, EffectResult, ShapeParameter};
 
 use super::rates::Pulls;
 use super::sessions::{TracedSession, oracle};

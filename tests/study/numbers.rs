@@ -1,7 +1,8 @@
 //! Effects whose shape has numbers (a centre, a width, a period, a time constant): the uncertainty of these numbers, and of
 //! the errors of the machine that share a part with the effect.
 
-use abbe::identify::results::{EffectName, EffectResult, Estimate};
+use abbe::identify::results::Estimate;
+use abbe::trace::result::{EffectName, EffectResult};
 
 use super::judging::{found, is, pulls, summary};
 use super::rates::{Pulls, Rate};

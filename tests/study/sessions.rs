@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Instant;
 
 use abbe::files::{ReadOptions, session};
-use abbe::identify::results::TraceResult;
+use abbe::trace::result::TraceResult;
 use abbe::trace::{TraceOptions, trace};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;

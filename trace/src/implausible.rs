@@ -4,7 +4,7 @@
 use abbe_identify::fit::{self, Fit};
 use abbe_identify::plausibility::{self, Plausibility, Pulls};
 use abbe_identify::problem::Problem;
-use abbe_identify::results::{Remainder, TraceResult, TraceVerdict};
+use abbe_identify::results::TraceVerdict;
 use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 
@@ -12,6 +12,7 @@ use super::TraceOutcome;
 use super::progress::Progress;
 use super::result::unsearched;
 use crate::freed::{is_another_session, with_set_ups_freed};
+use crate::result::{Remainder, TraceResult};
 
 /// The contradictions between the readings and a session.
 pub(super) struct Contradicted {

@@ -67,6 +67,7 @@ mod search;
 mod session_fit;
 mod start;
 mod state;
+pub mod statements;
 mod trace;
 pub mod validate;
 

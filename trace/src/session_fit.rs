@@ -3,9 +3,9 @@
 //! A decision about a limit needs a model that lacks nothing. χ² alone overlooks an effect that is small in each of many
 //! readings, so where limits are to be decided the residual is tested for structure too, by the test of the trace.
 
-use abbe_identify::fit::{Fit, prepare, report};
+use abbe_identify::fit::{Fit, FitResult, prepare, report};
 use abbe_identify::problem::Problem;
-use abbe_identify::results::{Estimate, FitResult};
+use abbe_identify::results::Estimate;
 use abbe_identify::tolerance::conformity;
 use abbe_model::Diagnostic;
 use abbe_model::session::Session;

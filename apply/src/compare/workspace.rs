@@ -22,8 +22,8 @@ use abbe_identify::model_file::IdentifiedModel;
 use abbe_identify::model_file::carried::States;
 use abbe_identify::model_file::errors::EstimatedErrors;
 use abbe_identify::numerics::parallel;
-use abbe_identify::results::validation::MovedParameter;
 use abbe_model::pose::Aim;
+use abbe_trace::validate::MovedParameter;
 
 /// Places along each axis, if the caller states none.
 pub const PLACES: usize = 5;

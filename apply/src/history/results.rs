@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use abbe_identify::results::MeasuredValue;
-use abbe_identify::results::validation::ValidationVerdict;
+use abbe_trace::validate::ValidationVerdict;
 
 use super::DAYS_PER_YEAR;
 use super::events::ChangeEvent;

@@ -1,6 +1,6 @@
 //! What a history is made from: the parameters of one machine in each of its sessions.
 
-use abbe_identify::results::validation::ValidationVerdict;
+use abbe_trace::validate::ValidationVerdict;
 
 /// The sessions of one machine.
 #[derive(Clone, Debug, Default)]

@@ -21,6 +21,8 @@ use std::sync::Arc;
 use abbe_model::Diagnostic;
 use abbe_model::chain::Machine;
 use faer::Mat;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::Fit;
 use crate::error;
@@ -30,7 +32,20 @@ use crate::numerics::triangle::Triangle;
 use crate::parameter_description::parameter_meaning;
 use crate::parameters::{Parameter, kind, natural};
 use crate::problem::Problem;
-use crate::results::{BaseResult, Estimate};
+use crate::results::Estimate;
+
+/// A minimal set of numbers that predicts the same readings as all parameters together.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct BaseResult {
+    /// The base parameters, each coefficient of a harmonic by itself.
+    pub parameters: Vec<Estimate>,
+    /// The parameters that are held at nominal.
+    pub held_at_nominal: Vec<String>,
+    /// Number of combinations that stay at nominal, since the readings determine them by less than their noise.
+    pub combinations_at_nominal: usize,
+    /// Largest change of a predicted reading against the fit, µm: rounding.
+    pub prediction_change_um: f64,
+}
 
 /// Which parameters are held at nominal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

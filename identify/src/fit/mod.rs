@@ -18,6 +18,7 @@ mod positions;
 mod prepare;
 mod quantities;
 mod reported;
+mod result;
 pub mod tpoint;
 
 use std::cell::RefCell;
@@ -48,6 +49,7 @@ pub use prepare::{NearMinimum, prepare, prepare_with, refit, with_families_linea
 pub(crate) use quantities::{Quantity, quantities, values_at};
 pub(crate) use reported::parameters_of_noise;
 pub use reported::{JudgedBy, model, outliers, parameters, report, unobservable};
+pub use result::FitResult;
 
 /// The result of a fit, in internal units.
 #[derive(Clone, Debug)]

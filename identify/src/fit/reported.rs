@@ -12,6 +12,7 @@ use super::quantities::{Quantity, quantities, rms_of_waves, slopes_of_rms, u_of_
 use super::{Fit, StepPosition, covariance, enlargement_warning};
 use super::{assume, cover};
 use crate::circular;
+use crate::fit::FitResult;
 use crate::heldout::cross_validation;
 use crate::heldout::{mislabelled_runs, rms_by_unit_mm, rms_mm};
 use crate::identifiability::weak;
@@ -23,8 +24,7 @@ use crate::plausibility;
 use crate::positioning::{self, diagonal};
 use crate::problem::Problem;
 use crate::results::{
-    Estimate, Finding, FitResult, Goodness, ModelFit, ModelResult, OfAngles, Outlier, Unobservable,
-    phases_follow_amplitudes,
+    Estimate, Finding, Goodness, ModelFit, ModelResult, OfAngles, Outlier, Unobservable, phases_follow_amplitudes,
 };
 use crate::straightness;
 use crate::tolerance::conformity;

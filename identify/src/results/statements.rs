@@ -7,7 +7,6 @@ use serde::Serialize;
 
 use super::outcome::{Goodness, TraceVerdict};
 use super::parameter::{DeterminedBy, Estimate};
-use crate::results::validation::ValidationVerdict;
 use crate::tolerance::rule::Decision;
 
 /// A component of an axis line or a direction, or the zero of an axis.
@@ -116,17 +115,6 @@ pub struct GoodStatement {
     /// The limits that are undecided, by identifier.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub undecided: Vec<String>,
-}
-
-/// Whether a model holds.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct ValidationStatement {
-    /// The verdict.
-    pub verdict: ValidationVerdict,
-    /// Number of readings without outliers.
-    pub readings: usize,
-    /// Number of them inside the range of the model's data.
-    pub readings_in_range: usize,
 }
 
 /// What to measure next.

@@ -10,8 +10,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use abbe::files::{self, ReadOptions};
-use abbe::identify::results::TraceResult;
 use abbe::model::session::Session;
+use abbe::trace::result::TraceResult;
 use abbe::trace::{Progress, TraceOptions, TraceOutcome, trace};
 
 use crate::suite::{ready, text};

@@ -6,8 +6,9 @@ use std::sync::Arc;
 use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::noise::NoiseSource;
-use abbe::identify::results::{EffectName, NextStep, Statements, TraceResult, TraceVerdict};
+use abbe::identify::results::{NextStep, TraceVerdict};
 use abbe::model::session::Session;
+use abbe::trace::result::{EffectName, TraceResult};
 use abbe::trace::{TraceOptions, trace};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -224,7 +225,7 @@ fn a_conflict_that_the_found_effects_remove_is_not_stated() {
         if found.result.verdict != TraceVerdict::Explained {
             continue;
         }
-        let statements = Statements::of_trace(&found.after, &found.result);
+        let statements = abbe::trace::statements::of_trace(&found.after, &found.result);
         assert!(found.result.plausibility.conflicts.is_empty(), "{seed}: {:?}", found.result.plausibility.conflicts);
         assert_ne!(statements.measure.step, NextStep::CorrectSession, "{seed}");
         let words = found.result.warnings.join("; ");

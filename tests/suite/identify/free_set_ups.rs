@@ -8,10 +8,10 @@ use std::sync::Arc;
 
 use abbe::files::robot::dh::{Convention, DhRow, Table};
 use abbe::files::{self, ReadOptions};
-use abbe::identify::fit::{prepare, report};
+use abbe::identify::fit::{FitResult, prepare, report};
 use abbe::identify::noise::NoiseSource;
 use abbe::identify::plausibility::{SuggestionKind, accepted};
-use abbe::identify::results::{Finding, FitResult};
+use abbe::identify::results::Finding;
 use abbe::model::Diagnostic;
 use abbe::model::axis::AxisKind;
 use abbe::model::session::Session;

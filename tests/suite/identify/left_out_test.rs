@@ -1,7 +1,7 @@
 //! A left-out test is predicted by the right component and not by its alias.
 
 use abbe::files::{self, ReadOptions};
-use abbe::identify::results::FitResult;
+use abbe::identify::fit::FitResult;
 use abbe::model::driver::Driver as FollowedDriver;
 use abbe::model::effect::shape::Harmonic;
 use abbe::model::effect::{Component as Moved, Effect, Shape as Form};

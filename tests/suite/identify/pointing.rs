@@ -9,8 +9,8 @@ use std::fs;
 use std::path::Path;
 
 use abbe::files::{self, ReadOptions};
+use abbe::identify::fit::tpoint::{PointingTerm, PointingTerms};
 use abbe::identify::fit::{prepare, tpoint};
-use abbe::identify::results::{PointingTerm, PointingTerms};
 use abbe::model::component::ErrorName;
 use abbe::model::session::Session;
 use nalgebra::{DMatrix, DVector, Rotation3, Unit, Vector3};

@@ -4,8 +4,8 @@ use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::monte_carlo::MonteCarlo;
 use abbe::identify::propagation::add_monte_carlo;
+use abbe::identify::propagation::{DrawnParameter, FitMonteCarlo, Verdict};
 use abbe::identify::quantity::Given;
-use abbe::identify::results::{DrawnParameter, FitMonteCarlo, Verdict};
 use abbe::identify::simulate::{Simulation, simulate};
 use abbe::model::session::Session;
 

@@ -1,8 +1,7 @@
 //! Real measurements: a UR10 before a laser tracker, a KUKA iiwa 14 whose ball sits in sockets.
 
 use abbe::files::{self, ReadOptions};
-use abbe::identify::fit::{prepare, report};
-use abbe::identify::results::FitResult;
+use abbe::identify::fit::{FitResult, prepare, report};
 use abbe::identify::series::{self, places};
 use abbe::model::session::Session;
 use test_needs::data;

@@ -1,7 +1,8 @@
 //! The effects that Yamaji, Hamabata & Ihara (HPC 2014, Section 7) found with an R-test, found by trace in readings of
 //! the plant. The session files declare no effect; only the assertions use the true effects.
 
-use abbe::identify::results::{EffectResult, TraceVerdict};
+use abbe::identify::results::TraceVerdict;
+use abbe::trace::result::EffectResult;
 use std::f64::consts::FRAC_PI_2;
 
 use abbe::files::{self, ReadOptions};

@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 
 use abbe::apply::compare::{CompareOptions, Input, compare_inputs};
 use abbe::files::{self, ReadOptions};
-use abbe::identify::fit::{base, prepare, report};
+use abbe::identify::fit::{FitResult, base, prepare, report};
 use abbe::identify::noise::NoiseSource;
-use abbe::identify::results::{EffectResult, FitResult, GoodnessVerdict, NotJudged, TraceVerdict};
+use abbe::identify::results::{GoodnessVerdict, NotJudged, TraceVerdict};
 use abbe::model::session::Session;
+use abbe::trace::result::EffectResult;
 use abbe::trace::{TraceOptions, trace};
 use nalgebra::{Rotation3, Unit, Vector3};
 use rand::{RngExt, SeedableRng};

@@ -4,8 +4,8 @@
 use std::collections::BTreeSet;
 
 use abbe::files::{self, ReadOptions};
-use abbe::identify::results::{EffectName, EffectResult, TraceResult};
 use abbe::model::session::Session;
+use abbe::trace::result::{EffectName, EffectResult, TraceResult};
 use abbe::trace::{TraceOptions, trace};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;

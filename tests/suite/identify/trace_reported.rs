@@ -9,7 +9,6 @@ use abbe::identify::fit::fit;
 use abbe::identify::noise::Noise;
 use abbe::identify::problem::Problem;
 use abbe::identify::quantity::Given;
-use abbe::identify::results::EffectName;
 use abbe::identify::simulate::{Simulation, simulate};
 use abbe::model::driver::Driver;
 use abbe::model::effect::shape::{Harmonic, Local};
@@ -18,6 +17,7 @@ use abbe::model::session::Session;
 use abbe::plan::candidate_tests::candidate_tests;
 use abbe::plan::separating_tests::separate_aliases;
 use abbe::plan::test_variations::TestVariations;
+use abbe::trace::result::EffectName;
 use abbe::trace::{TraceOptions, trace};
 
 use crate::suite::{abbe, ready, text};
@@ -83,7 +83,7 @@ fn the_uncertainty_of_a_declared_harmonic_covers_the_aliases_of_the_found_effect
     let session = wave_and_tilt(1);
     let result = trace(&session, &TraceOptions::default(), &|_| true).unwrap().result;
     assert_eq!(result.effects.len(), 1);
-    let is_truth = |name: &&abbe::identify::results::EffectName| {
+    let is_truth = |name: &&abbe::trace::result::EffectName| {
         name.component == "EAC" && name.shape == "harmonic" && name.order == Some(3.0)
     };
     let effect = &result.effects[0];

@@ -8,10 +8,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use abbe::files::{self, ReadOptions};
-use abbe::identify::fit::{prepare, report};
+use abbe::identify::fit::{FitResult, prepare, report};
 use abbe::identify::noise::{Noise, NoiseSource};
 use abbe::identify::problem::Problem;
-use abbe::identify::results::FitResult;
 use abbe::model::axis::AxisKind;
 use abbe::model::component::{ErrorKind, ErrorName, Freedom};
 use abbe::model::driver::Driver;

@@ -6,11 +6,12 @@ use abbe_identify::fit::{self, Fit, JudgedBy};
 use abbe_identify::heldout::mislabelled_runs;
 use abbe_identify::plausibility::{self, Plausibility};
 use abbe_identify::problem::Problem;
-use abbe_identify::results::{EffectResult, ModelResult, RejectedCandidate, Remainder, TraceResult, TraceVerdict};
+use abbe_identify::results::{ModelResult, TraceVerdict};
 use abbe_model::Diagnostic;
 
 use super::changed_parameters;
 use super::verdict::not_examined;
+use crate::result::{EffectResult, RejectedCandidate, Remainder, TraceResult};
 
 /// A fitted model and its figures.
 #[derive(Clone)]

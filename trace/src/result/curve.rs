@@ -3,13 +3,13 @@
 //! A spectrum is drawn over one period of a rotary axis, or over the positions of a linear axis. Points without a
 //! reading nearby are marked: there the prior determines the curve.
 
-use abbe_identify::fit::Fit;
-use abbe_identify::fit::contribution_beside_noise;
+use abbe_identify::fit::{Fit, contribution_beside_noise};
 use abbe_identify::problem::Problem;
-use abbe_identify::results::CurvePoint;
 use abbe_model::driver::{Driver, DriverSample};
 use abbe_model::effect::{Effect, Shape};
 use faer::Mat;
+
+use crate::result::CurvePoint;
 
 /// Number of points of a reported curve.
 const CURVE_POINTS: usize = 73;

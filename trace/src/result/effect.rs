@@ -3,9 +3,7 @@
 use abbe_identify::fit::Fit;
 use abbe_identify::parameters::Parameter;
 use abbe_identify::problem::Problem;
-use abbe_identify::results::{
-    AliasResult, EffectName, EffectResult, Estimate, LargestOrder, PriorResult, ShapeParameter,
-};
+use abbe_identify::results::Estimate;
 use abbe_model::Diagnostic;
 use abbe_model::chain::Machine;
 use abbe_model::effect::description::{explanations, meaning};
@@ -18,6 +16,7 @@ use super::curve::{curve_of, curve_units};
 use super::prediction::Predictions;
 use super::{HeldOut, TraceFindings};
 use crate::candidates::library::Family;
+use crate::result::{AliasResult, EffectName, EffectResult, LargestOrder, PriorResult, ShapeParameter};
 
 /// Largest exponent of a likelihood ratio that is a finite number.
 const LARGEST_EXPONENT: f64 = 700.0;

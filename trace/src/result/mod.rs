@@ -6,11 +6,12 @@ mod effect;
 mod poses;
 mod prediction;
 mod rejected;
+mod reported;
 mod verdict;
 
 use abbe_identify::fit::{self, Fit, JudgedBy, prepare_with};
 use abbe_identify::problem::Problem;
-use abbe_identify::results::{EffectResult, Estimate, ParameterChange, TraceResult};
+use abbe_identify::results::{Estimate, ParameterChange};
 use abbe_model::Diagnostic;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::effect::{Component, Effect, Shape};
@@ -30,6 +31,10 @@ use build::{Model, Searched, Statements, build};
 pub use effect::effect_name;
 pub(super) use effect::effective_parameters;
 pub(super) use poses::{PosesEnded, outcome_of_poses};
+pub use reported::{
+    AliasResult, AlternativeResult, CurvePoint, EffectName, EffectResult, LargestOrder, PriorResult, RejectedCandidate,
+    Remainder, SeparatingTestResult, SeparationResult, ShapeParameter, TraceResult,
+};
 use verdict::verdict;
 
 /// Share of a signal that remains beside the declared model below which the model contains it.

@@ -2,7 +2,6 @@
 
 use abbe_identify::fit::Fit;
 use abbe_identify::problem::Problem;
-use abbe_identify::results::EffectResult;
 use abbe_model::Diagnostic;
 use abbe_model::effect::Effect;
 
@@ -11,6 +10,7 @@ use super::verdict::of_poses;
 use super::{Model, Searched, Statements, build, explained, residual_before};
 use crate::poses::{AcceptedEffect, PoseSearch};
 use crate::remainder::Structure;
+use crate::result::EffectResult;
 use crate::{SearchStep, TraceOutcome};
 
 /// How a search with families ended.

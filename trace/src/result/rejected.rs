@@ -1,10 +1,10 @@
 //! Candidates that the search added and that are rejected by the held-out error.
 
-use abbe_identify::results::RejectedCandidate;
 use abbe_model::chain::Machine;
 
 use super::{HeldOut, effect_name};
 use crate::paired::HeldOutDecrease;
+use crate::result::RejectedCandidate;
 use crate::state::SearchState;
 
 /// Candidates that score better than the null distribution of the search and did not lower the held-out error by more

@@ -1,10 +1,11 @@
 //! Verdict of a trace and the residual of its model.
 
-use abbe_identify::results::{Remainder, TraceVerdict};
+use abbe_identify::results::TraceVerdict;
 
 use super::TraceFindings;
 use crate::constants::EXPLAINED_SHARE;
 use crate::remainder::Structure;
+use crate::result::Remainder;
 
 /// The verdict of the search, and the residual of the model with the found effects, if it has found any.
 pub(super) fn verdict(findings: &TraceFindings<'_>, found: bool) -> (TraceVerdict, Remainder) {

@@ -9,7 +9,6 @@ use abbe_identify::noise::{Noise, NoiseSource, ShownNoise};
 use abbe_identify::numerics::triangle::Triangle;
 use abbe_identify::problem::Problem;
 use abbe_identify::results::Estimate;
-use abbe_identify::results::validation::RmsResult;
 use abbe_model::Diagnostic;
 use abbe_model::component::ErrorName;
 use abbe_model::session::Prior;
@@ -17,6 +16,7 @@ use abbe_model::session::Session;
 use abbe_model::session::limits::MIN_UM;
 
 use crate::noise_model::estimate_noise_model;
+use crate::validate::RmsResult;
 
 /// Maximum number of rounds that re-estimate noise and outliers.
 const MAX_ROUNDS: usize = 4;

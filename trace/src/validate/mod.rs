@@ -11,24 +11,26 @@
 //!
 //! - `machine`: whether the session is of the model's machine; `known`: the fit of the set-up with known errors;
 //! - `prediction`: predicted variance of each reading, coverage, χ²; `moved`: parameters that have changed;
-//! - `verdict`: the rule; [`abbe_identify::results::validation`]: the result as it is reported.
+//! - `verdict`: the rule; `results`: the result as it is reported.
 
 mod known;
 pub mod machine;
 mod moved;
 mod prediction;
+mod results;
 mod verdict;
 
 use abbe_identify::model_file::{IdentifiedModel, range};
 use abbe_identify::noise::ReadingNoise;
-use abbe_identify::results::validation::{
-    ModelNotJudged, MovedParameter, RmsResult, ValidatedModel, ValidationResult, WithoutResult,
-};
 use abbe_model::Diagnostic;
 use abbe_model::component::ErrorName;
 use abbe_model::session::Session;
 use known::KnownErrors;
 use prediction::Prediction;
+pub use results::{
+    JudgedResidual, ModelNotJudged, MovedParameter, RmsResult, ValidatedModel, ValidationResult, ValidationStatement,
+    ValidationVerdict, WithoutResult,
+};
 use verdict::{Evidence, verdict};
 
 /// A validated model: what plots and tables need beside the result.

@@ -14,11 +14,11 @@
 use abbe_identify::numerics::solve::solve_square;
 use abbe_identify::numerics::symmetric::pseudo_inverse;
 use abbe_identify::numerics::tails::normal_tail;
-use abbe_identify::results::validation::MovedParameter;
 use abbe_model::Diagnostic;
 use faer::Mat;
 
 use super::known::{KnownErrors, Linearised};
+use crate::validate::MovedParameter;
 
 /// Probability that a change is stated of a machine that has not changed.
 const SIGNIFICANCE: f64 = 0.005;

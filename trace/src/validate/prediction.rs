@@ -15,11 +15,11 @@ use abbe_identify::numerics::solve::{Svd, solve_square};
 use abbe_identify::numerics::symmetric::Symmetric;
 use abbe_identify::numerics::tails::{normal_quantile, residual_tail};
 use abbe_identify::numerics::tolerances::MIN_IDENTIFIABLE;
-use abbe_identify::results::validation::{JudgedResidual, RmsResult};
 use abbe_model::Diagnostic;
 use faer::Mat;
 
 use super::known::{KnownErrors, Linearised, Rms};
+use crate::validate::{JudgedResidual, RmsResult};
 
 /// Probability of the intervals.
 const COVERAGE: f64 = 0.95;

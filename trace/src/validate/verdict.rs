@@ -15,7 +15,7 @@
 //!
 //! A model without effects is compared with the nominal machine.
 
-use abbe_identify::results::validation::ValidationVerdict;
+use crate::validate::ValidationVerdict;
 
 /// What the verdict follows from.
 pub(super) struct Evidence {

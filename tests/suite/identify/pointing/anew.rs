@@ -2,10 +2,9 @@
 
 use abbe::identify::fit::prepare;
 use abbe::identify::model_file::{IdentifiedModel, Provenance};
-use abbe::identify::results::validation::{ValidationResult, ValidationVerdict};
 use abbe::model::component::ErrorName;
 use abbe::model::session::Session;
-use abbe::trace::validate::{validate, validate_anew};
+use abbe::trace::validate::{ValidationResult, ValidationVerdict, validate, validate_anew};
 use test_needs::data;
 
 use super::{observed, positions, simulated, telescope};

@@ -1,7 +1,7 @@
 //! Hysteresis of the drives of a mount: `trace` on stars of rotation matrices in random order, with an axis that lags behind
 //! by the direction of its last move, and without it.
 
-use abbe::identify::results::{EffectResult, TraceResult};
+use abbe::trace::result::{EffectResult, TraceResult};
 use abbe::trace::{TraceOptions, trace};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use abbe::files::{self, ReadOptions};
-use abbe::identify::results::{EffectResult, TraceResult};
+use abbe::trace::result::{EffectResult, TraceResult};
 use abbe::trace::{TraceOptions, trace};
 use serde_json::Value;
 

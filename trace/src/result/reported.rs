@@ -2,17 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use abbe_identify::plausibility::Plausibility;
+use abbe_identify::results::{Estimate, ModelResult, ParameterChange, TraceVerdict};
+use abbe_identify::tolerance::Conformity;
 use abbe_model::document::print::Block;
 use abbe_model::document::test::Test;
 use abbe_model::unit::Unit;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, Serializer};
-
-use super::ModelResult;
-use super::outcome::TraceVerdict;
-use super::parameter::{Estimate, ParameterChange};
-use crate::plausibility::Plausibility;
-use crate::tolerance::Conformity;
 
 /// An effect by its keys of session files.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

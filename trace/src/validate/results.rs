@@ -2,11 +2,10 @@
 
 use std::fmt;
 
+use abbe_identify::noise::ReadingNoise;
+use abbe_identify::results::{Estimate, ParameterChange};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-use crate::noise::ReadingNoise;
-use crate::results::{Estimate, ParameterChange};
 
 /// The verdict on a saved model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -157,4 +156,15 @@ pub struct MovedParameter {
     pub p_value: f64,
     /// Parameters whose change explains these readings nearly as well (χ² larger by less than 4).
     pub alternatives: Vec<String>,
+}
+
+/// Whether a model holds.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ValidationStatement {
+    /// The verdict.
+    pub verdict: ValidationVerdict,
+    /// Number of readings without outliers.
+    pub readings: usize,
+    /// Number of them inside the range of the model's data.
+    pub readings_in_range: usize,
 }
