@@ -1,5 +1,6 @@
 //! Effects that a trace has found, each beside its competing explanations.
 
+use abbe::identify::results::Estimate;
 use abbe::model::parameter_id::ParameterId;
 use abbe::model::words::counted;
 use abbe::trace::TraceOutcome;
