@@ -5,6 +5,7 @@ use std::sync::Arc;
 use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::{FitResult, prepare, report};
 use abbe::identify::plausibility::{ConflictKind, SuggestionKind};
+use abbe::identify::results::TraceVerdict;
 use abbe::model::Diagnostic;
 use abbe::model::session::Session;
 use abbe::trace::{TraceOptions, trace};
