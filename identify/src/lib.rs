@@ -64,6 +64,7 @@ pub mod repeated;
 pub mod results;
 pub mod self_calibration;
 pub mod series;
+mod set_up_points;
 pub mod simulate;
 pub mod start;
 pub mod statements;

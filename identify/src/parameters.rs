@@ -16,7 +16,7 @@ use abbe_model::session::{Prior, Session, Test};
 use abbe_model::unit::InternalUnit;
 
 use crate::error;
-use crate::start::{point_mm, points};
+use crate::set_up_points::{point_mm, points};
 use crate::unit::ParameterUnit;
 use basis::BasisOverTest;
 pub(crate) use preference::{kind, natural, pivot_preference};

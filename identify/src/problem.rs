@@ -28,7 +28,7 @@ use rand_pcg::Pcg64;
 
 use crate::error;
 use crate::heldout::folds::Folds;
-use crate::noise::Noise;
+use crate::noise::{Noise, ReadingNoise};
 use crate::numerics::parallel;
 use crate::numerics::triangle::BLOCK_ROWS;
 use crate::parameters::{Parameters, TestParameters};
@@ -96,20 +96,8 @@ const RANDOM_TRAVEL_MM: f64 = 300.0;
 /// Mean number of readings below which runs are evaluated together.
 const SHORT_RUN: usize = 8;
 impl Problem {
-    /// The problem of a session with its declared parameters and effects.
-    ///
-    /// # Errors
-    /// If there are no readings, or an effect cannot be evaluated.
-    pub fn new(session: &Session, noise: Noise, seed: u64) -> Result<Problem, Diagnostic> {
-        let tests: Vec<Test> = session.tests.iter().filter(|test| test.readings.is_some()).cloned().collect();
-        if tests.is_empty() {
-            return Err(error::no_readings());
-        }
-        let (tests, stations) = crate::start::located(session, tests, &noise);
-        Problem::at(session, tests, stations, noise, seed)
-    }
-
-    /// The same for tests and stations whose free points and poses are found.
+    /// The problem of a session with its declared parameters and effects, for tests and stations whose free points and
+    /// poses are found ([`Problem::new`] finds them).
     ///
     /// # Errors
     /// If an effect cannot be evaluated.
@@ -307,6 +295,11 @@ impl Problem {
     }
 
     /// The unit of readings and residuals in results: µm, or ″ if every channel is an angle. At the lever of such
+    /// The noise of a reading, as results have it.
+    pub fn reading_noise(&self) -> ReadingNoise {
+        ReadingNoise { unit: self.unit(), value: self.noise.sigma_mm * 1e3, source: self.noise.source }
+    }
+
     /// a session ([`Session::lever_mm`]) one arcsecond is one micrometre.
     pub fn unit(&self) -> Unit {
         self.session.reading_unit()

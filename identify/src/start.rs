@@ -10,14 +10,17 @@ mod target;
 
 use std::sync::Arc;
 
+use abbe_model::Diagnostic;
 use abbe_model::instrument::{Group, InstrumentKind, SharedBy, Station};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Prior, Session, Test};
 use nalgebra::Vector3;
 
+use crate::error;
 use crate::fit::minimum;
 use crate::noise::Noise;
 use crate::problem::Problem;
+use crate::set_up_points::{point_mm, points};
 
 /// Readings of a test that are used.
 const MAX_ROWS: usize = 300;
@@ -25,8 +28,23 @@ const MAX_ROWS: usize = 300;
 /// exact dependencies are simpler.
 const NEAR_MM: f64 = 1.0;
 
+impl Problem {
+    /// The problem of a session with its declared parameters and effects.
+    ///
+    /// # Errors
+    /// If there are no readings, or an effect cannot be evaluated.
+    pub fn new(session: &Session, noise: Noise, seed: u64) -> Result<Problem, Diagnostic> {
+        let tests: Vec<Test> = session.tests.iter().filter(|test| test.readings.is_some()).cloned().collect();
+        if tests.is_empty() {
+            return Err(error::no_readings());
+        }
+        let (tests, stations) = located(session, tests, &noise);
+        Problem::at(session, tests, stations, noise, seed)
+    }
+}
+
 /// Tests with readings, with the points found that have no prior, and their stations, with the poses found that are free.
-pub(crate) fn located(session: &Session, stated: Vec<Test>, noise: &Noise) -> (Vec<Test>, Vec<Station<f64>>) {
+fn located(session: &Session, stated: Vec<Test>, noise: &Noise) -> (Vec<Test>, Vec<Station<f64>>) {
     if !stated.iter().all(is_read) {
         let stations = stations(session, &stated);
         return (stated, stations);
@@ -68,23 +86,9 @@ fn free_points(test: &Test) -> impl Iterator<Item = (usize, usize)> {
     })
 }
 
-/// The index of the first parameter of the point on the table, or where the station stands, and of that on the tool.
-pub(crate) fn points(station: &Station<f64>) -> [Option<usize>; 2] {
-    match station {
-        // A station on the bed is no point of the table, but it is a point.
-        Station::Distance(_) => [Some(distance::STATION), Some(distance::REFLECTOR)],
-        _ => station.points().map(|point| point.map(|point| point.first)),
-    }
-}
-
 /// Whether the point of the tool frame of a test has no prior at all.
 fn is_unknown(test: &Test, first: usize) -> bool {
     (first..first + 3).all(|parameter| test.priors.get(parameter) == Some(&Prior::Free))
-}
-
-/// The coordinates of a point of a set-up, mm.
-pub(crate) fn point_mm(station: &Station<f64>, side: usize) -> Option<[f64; 3]> {
-    station.clone().points_mut()[side].as_deref().copied()
 }
 
 /// Moves a point of the set-up to other coordinates, mm.

@@ -8,7 +8,7 @@ use super::results::{Correlation, ErrorAnalysis, LeaveOneOut, PlanAnalysis, Test
 use super::{budget, collision, effects, indices, sensitivity, states};
 use abbe_identify::identifiability;
 use abbe_identify::linear::{Linearisation, is_of_interest};
-use abbe_identify::noise::{Noise, NoiseSource, ReadingNoise};
+use abbe_identify::noise::{Noise, NoiseSource};
 use abbe_identify::parameter_description::parameter_meaning;
 use abbe_identify::problem::Problem;
 
@@ -113,7 +113,7 @@ fn analyse_problem(problem: &Problem, travel_mm: f64) -> Result<PlanAnalysis, Di
     let clearances = collision::clearances(&problem.session);
     warnings.extend(collision::warnings(&problem.session, &clearances));
     Ok(PlanAnalysis {
-        noise: ReadingNoise::of(problem),
+        noise: problem.reading_noise(),
         readings: problem.readings(),
         rank: linear.rank.identifiable_basis.ncols(),
         parameter_count: list.len(),

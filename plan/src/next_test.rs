@@ -25,6 +25,6 @@ pub struct NextTest {
 impl NextTest {
     /// Of a plan.
     pub fn new(problem: &Problem, improvement: Option<Improvement>, ranges: Vec<Shrinkage>) -> NextTest {
-        NextTest { noise: ReadingNoise::of(problem), improvement, ranges }
+        NextTest { noise: problem.reading_noise(), improvement, ranges }
     }
 }

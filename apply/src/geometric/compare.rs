@@ -175,7 +175,7 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
     Ok(Comparison {
         method: method.word().into(),
         readings: problem.readings(),
-        noise: ReadingNoise::of(&problem),
+        noise: problem.reading_noise(),
         rms_um: abbe_identify::heldout::rms_mm(&problem, &full.residuals) * 1e3,
         method_rms_um: rms_um(&by_method),
         nominal_rms_um: rms_um(&vec![0.0; list.len()]),

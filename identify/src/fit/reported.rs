@@ -16,8 +16,8 @@ use crate::fit::FitResult;
 use crate::heldout::cross_validation;
 use crate::heldout::{mislabelled_runs, rms_by_unit_mm, rms_mm};
 use crate::identifiability::weak;
+use crate::noise;
 use crate::noise::outliers::firsts_at_reversal;
-use crate::noise::{self, ReadingNoise};
 use crate::numerics::rank::Rank;
 use crate::parameter_description::parameter_meaning;
 use crate::plausibility;
@@ -92,7 +92,7 @@ pub fn model(
     let mut parameters = parameters(problem, fit);
     determined.mark(problem, &mut parameters, goodness);
     Ok(ModelResult {
-        noise: ReadingNoise::of(problem),
+        noise: problem.reading_noise(),
         of_angles,
         noise_ar_coefficients: problem.noise.ar_coefficients.clone(),
         fit: ModelFit {

@@ -24,12 +24,11 @@ use abbe_model::session::readings::Readings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::problem::Problem;
 use abbe_model::unit::Unit;
 pub(crate) use autocorrelation::enlargement_of_mean;
 pub use autocorrelation::{Autocorrelation, Process, along_runs};
 pub(crate) use stated::silent_channels;
-pub use stated::stated_against_repeats;
+pub use stated::{rigid_targets, stated_against_repeats};
 use trends::Trends;
 pub use waves::AlongRuns;
 
@@ -113,13 +112,6 @@ pub struct ReadingNoise {
     pub source: NoiseSource,
 }
 
-impl ReadingNoise {
-    /// The noise of a problem.
-    pub fn of(problem: &Problem) -> ReadingNoise {
-        ReadingNoise { unit: problem.unit(), value: problem.noise.sigma_mm * 1e3, source: problem.noise.source }
-    }
-}
-
 impl Noise {
     /// White noise.
     pub fn white(sigma_mm: f64, source: NoiseSource) -> Noise {
@@ -175,18 +167,6 @@ impl ShownNoise {
 /// Noise of targets below which their instrument has solved them as one rigid body: no instrument reads places in space to
 /// 0.05 µm.
 const RIGID_MM: f64 = 5e-5;
-
-/// What is said of targets that keep their distances exactly.
-pub fn rigid_targets(problem: &Problem) -> Option<String> {
-    let kept = |test: usize, row: usize| !problem.rejected[test][row];
-    let (sigma_mm, _) = flange::noise_of_targets(&problem.tests, kept).filter(|(sigma_mm, _)| *sigma_mm <= RIGID_MM)?;
-    let stated = problem.session.keys_of_noise();
-    Some(format!(
-        "the targets keep their distances to {:.3} µm: the instrument has solved them as one rigid body, so that they show no \
-         noise; the noise is that of {stated}, or of the residual where none is stated",
-        sigma_mm * 1e3
-    ))
-}
 
 /// Pure error: residuals (rows × channels, mm) without the trend of their run and their mean over repeats, rescaled
 /// for the variance that these remove. `None` for readings without repeats.

@@ -1,6 +1,6 @@
-//! Comparison of the stated noise with the noise of repeats.
+//! Comparison of the stated noise with the noise of repeats and of several targets.
 
-use super::PureError;
+use super::{PureError, RIGID_MM, flange};
 use crate::numerics::tails::chi_square_tails;
 use crate::problem::Problem;
 
@@ -70,4 +70,16 @@ pub(crate) fn silent_channels(problem: &Problem, residuals: &[Vec<f64>], rank: u
         }
     }
     warnings
+}
+
+/// What is said of targets that keep their distances exactly.
+pub fn rigid_targets(problem: &Problem) -> Option<String> {
+    let kept = |test: usize, row: usize| !problem.rejected[test][row];
+    let (sigma_mm, _) = flange::noise_of_targets(&problem.tests, kept).filter(|(sigma_mm, _)| *sigma_mm <= RIGID_MM)?;
+    let stated = problem.session.keys_of_noise();
+    Some(format!(
+        "the targets keep their distances to {:.3} µm: the instrument has solved them as one rigid body, so that they show no \
+         noise; the noise is that of {stated}, or of the residual where none is stated",
+        sigma_mm * 1e3
+    ))
 }

@@ -18,10 +18,9 @@ use abbe_model::session::{Prior, Session, Test};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::{MAX_ROWS, is_unknown};
+use crate::set_up_points::{REFLECTOR, STATION};
 
-/// The first parameters of station and reflector, and that of the dead path.
-pub(super) const STATION: usize = 0;
-pub(super) const REFLECTOR: usize = 3;
+/// The parameter of the dead path.
 const ZERO: usize = 6;
 /// Maximum number of turns, and the step at which they end, mm.
 const MAX_ROUNDS: usize = 100;

@@ -15,6 +15,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{MAX_ROWS, is_unknown, set_point};
 use crate::numerics::median;
+use crate::set_up_points::points;
 
 /// Maximum number of alternations, and the step at which they end, mm.
 const MAX_ROUNDS: usize = 200;
@@ -57,7 +58,7 @@ pub(super) fn locate(session: &Session, tests: &mut [Test]) {
 fn is_free(test: &Test) -> bool {
     let kind = test.station.kind();
     matches!(kind, InstrumentKind::Tracker | InstrumentKind::Pose | InstrumentKind::Socket)
-        && super::points(&test.station)[TOOL].is_some_and(|first| is_unknown(test, first))
+        && points(&test.station)[TOOL].is_some_and(|first| is_unknown(test, first))
 }
 
 /// The readings of a test: `P_i(t₀)` and the columns of `A_i`, and what was observed.

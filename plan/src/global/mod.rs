@@ -201,7 +201,7 @@ pub fn global(problem: &Problem, options: &GlobalOptions) -> Result<GlobalAnalys
         }
     });
     Ok(GlobalAnalysis {
-        noise: ReadingNoise::of(problem),
+        noise: problem.reading_noise(),
         samples: options.samples,
         evaluations: options.samples * (plan.inputs.len() + 2),
         errors: errors.collect(),

@@ -202,7 +202,7 @@ pub fn select(session: &Session, tests: &[&Test], options: &PoseOptions) -> Resu
         value: value(&chosen),
         bound: bound::best_value(&design, &chosen),
         random_median: median(&mut values),
-        noise: ReadingNoise::of(&problem),
+        noise: problem.reading_noise(),
         candidates: candidates.len(),
         excluded,
         uncertainties: of_targets

@@ -157,7 +157,7 @@ pub fn validate_anew(model: &IdentifiedModel, session: &Session, anew: &[ErrorNa
         readings_in_range,
         outside: left,
         outliers: rejected.iter().flatten().filter(|rejected| **rejected).count(),
-        noise: ReadingNoise { source: known.noise_source, ..ReadingNoise::of(&known.set_up) },
+        noise: ReadingNoise { source: known.noise_source, ..known.set_up.reading_noise() },
         nominal: RmsResult::from(&nominal),
         locations: RmsResult::from(&locations),
         model: ValidatedModel {
