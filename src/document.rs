@@ -140,8 +140,7 @@ pub struct Document<'r, T> {
     /// Seed of all random numbers.
     #[serde(skip_serializing_if = "Option::is_none")]
     seed: Option<u64>,
-    /// The options on the command line, by their long names: `true` for a flag, a number, a string, or an array of them
-    /// for a repeated option.
+    /// The options by their long names on the command line: `true`, a number, a string, or an array of them.
     options: Map<String, Value>,
     /// The result.
     #[serde(flatten)]

@@ -152,8 +152,8 @@ pub struct ExportResult {
     /// Changes of a control's kinematic parameters.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kinematics: Option<KinematicTable>,
-    /// Of a description without the effects of the model: the volumetric error over the range of its readings without
-    /// changes, with the location errors of the model, and with those that are written.
+    /// Of a description without the model's effects: the volumetric error without changes, with the location errors of
+    /// the model, and with those that are written.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub remaining: Option<Remaining>,
     /// How the control reads compensation tables.

@@ -14,12 +14,12 @@ pub struct Definition {
     /// Identifier.
     #[schemars(with = "FigureId")]
     pub id: &'static str,
-    /// Symbol in the standard; absent if it has none. An arrow is the direction of the approach.
+    /// Symbol; absent if it has none. An arrow is the direction of the approach.
     #[serde(skip_serializing_if = "str::is_empty")]
     pub symbol: &'static str,
-    /// Name in the standard.
+    /// Short name.
     pub name: &'static str,
-    /// The standard, with the edition.
+    /// The standard, with the edition where the definition depends on it.
     pub standard: &'static str,
 }
 
@@ -31,7 +31,7 @@ pub struct Figure {
     pub definition: &'static Definition,
     /// Value, in `unit`.
     pub value: f64,
-    /// Standard uncertainty of the value, in `unit`, from the contributors that the test states; absent if it states none.
+    /// Standard uncertainty of the value, in `unit`; absent if the test states no contributors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub u: Option<f64>,
     /// `um` or `arcsec`.

@@ -294,12 +294,12 @@ impl Problem {
         self.models[test].channels().len()
     }
 
-    /// The unit of readings and residuals in results: µm, or ″ if every channel is an angle. At the lever of such
     /// The noise of a reading, as results have it.
     pub fn reading_noise(&self) -> ReadingNoise {
         ReadingNoise { unit: self.unit(), value: self.noise.sigma_mm * 1e3, source: self.noise.source }
     }
 
+    /// The unit of readings and residuals in results: µm, or ″ if every channel is an angle. At the lever of such
     /// a session ([`Session::lever_mm`]) one arcsecond is one micrometre.
     pub fn unit(&self) -> Unit {
         self.session.reading_unit()

@@ -8,7 +8,7 @@ use abbe_model::document::fault::Fault;
 use abbe_model::document::node::{Named, Node};
 use abbe_model::document::value::Long;
 use abbe_model::session::limits::{LARGEST, MAX_LENGTH_MM};
-use abbe_model::unit::Unit;
+use abbe_model::unit::{Dimension, Unit};
 use abbe_model::words::number as number_in_words;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -97,7 +97,9 @@ impl Given {
         if self.value == 0.0 || self.unit == wanted {
             return Ok(self.value);
         }
-        let convert = |unit: &str, to: &str| Unit::parse(unit)?.convert(self.value, Unit::parse(to)?);
+        // A number over a temperature is a difference, and a temperature none.
+        let parsed = |unit: &str| Unit::parse(unit).filter(|unit| unit.dimension() != Dimension::Temperature);
+        let convert = |unit: &str, to: &str| parsed(unit)?.convert(self.value, parsed(to)?);
         let converted = convert(&self.unit, wanted).or_else(|| {
             // `mm/h` to `um/h`.
             let (above, below) = self.unit.split_once('/')?;
@@ -142,7 +144,7 @@ pub fn read(path: &Path) -> Result<Vec<Given>, Diagnostic> {
         }
     };
     let source = abbe_files::text(path, "the file of values")?;
-    Ok(lowered(&source, |Long(values): &Long<Named<Node>>| values.0.iter().map(given).collect())?)
+    lowered(&source, |Long(values): &Long<Named<Node>>| values.0.iter().map(given).collect())
 }
 
 #[cfg(test)]

@@ -61,8 +61,7 @@ pub struct Repeated {
     pub sessions: Vec<String>,
     /// The parameters.
     pub parameters: Vec<RepeatedParameter>,
-    /// Sessions that deviate from the others by more than the uncertainties of the fits explain, the most significant
-    /// first.
+    /// Sessions that deviate from the others beyond the uncertainties of the fits, the most significant first.
     pub deviating: Vec<DeviatingSession>,
 }
 

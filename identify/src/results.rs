@@ -32,9 +32,9 @@ pub struct Outlier {
     pub line: usize,
     /// Length of its residual, µm.
     pub residual_um: f64,
-    /// Whether it is the first of a run that begins where an axis reverses: the lost motion there is that of the way before,
-    /// which is not known. Such a reading is no fault.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    /// Whether a run begins with it where an axis reverses: the lost motion there follows from the motion before the run,
+    /// which is not known. It is no fault.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub first_at_reversal: bool,
 }
 

@@ -32,7 +32,6 @@ use crate::tolerance::rule::Decision;
 
 /// A component of a unit vector above which it is taken as along the axis.
 const ALONG: f64 = 0.9;
-/// Millimetres in a metre, micrometres in a millimetre.
 
 impl Statements {
     /// Of a fit.
@@ -117,7 +116,7 @@ pub fn in_doubt(problem: &Problem, plausibility: &Plausibility) -> Option<String
     let unit = plausibility.conflicts.iter().find(|conflict| conflict.kind == ConflictKind::Unit);
     let likely = |conflict: &Conflict| {
         let likely = likely_unit(conflict.value / conflict.stated, problem.unit());
-        format!("probably {likely}, or divided before")
+        format!("possibly {likely}, or deviations that were divided before")
     };
     unit.map(likely).or_else(|| doubt_on_unit(problem))
 }

@@ -235,6 +235,31 @@ impl fmt::Display for Unit {
     }
 }
 
+/// The unit of the figures of readings in documents: µm or arcsec.
+pub mod reading {
+    use schemars::{Schema, SchemaGenerator, json_schema};
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer};
+
+    use super::Unit;
+
+    /// Reads the unit.
+    ///
+    /// # Errors
+    /// If it is another one.
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Unit, D::Error> {
+        match Unit::deserialize(from)? {
+            unit @ (Unit::Micrometre | Unit::Arcsecond) => Ok(unit),
+            other => Err(D::Error::custom(format!("the unit of readings is {other}; `um` or `arcsec` is expected"))),
+        }
+    }
+
+    /// Its schema.
+    pub fn schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({"type": "string", "enum": [Unit::Micrometre.name(), Unit::Arcsecond.name()]})
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

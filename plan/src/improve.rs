@@ -49,8 +49,8 @@ pub struct Improvement {
     pub steps: Vec<ProposedTest>,
     /// The exchanges of proposed tests, one sentence each.
     pub exchanged: Vec<String>,
-    /// The best single candidate tests, in the order of the criterion or of its gain per minute; none if none helps. Of
-    /// tests with equal readings, one is listed.
+    /// The best single candidate tests, by the criterion or its gain per minute. Of tests with equal readings, one is
+    /// listed.
     pub alternatives: Vec<AlternativeTest>,
 }
 
@@ -59,8 +59,7 @@ pub struct Improvement {
 pub struct ProposedTest {
     /// Description of the test.
     pub test: String,
-    /// Value of the criterion with this test and those before it; infinite (`null` in JSON) where an error is not
-    /// identifiable.
+    /// Value of the criterion with this test and those before it; `null` where an error is not identifiable.
     #[schemars(with = "Option<f64>")]
     pub after: f64,
     /// Duration of the test, min.

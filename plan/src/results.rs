@@ -155,8 +155,8 @@ pub struct CorrelatedWith {
 pub struct Curve {
     /// The test.
     pub test: String,
-    /// Change of the reading (for three coordinates: length of the vector) per unit of the error, in the unit of the
-    /// sensitivity, evenly thinned.
+    /// Change of the reading, or of the length of its vector, per unit of the error, in the unit of the sensitivity,
+    /// evenly thinned.
     pub values: Vec<f64>,
 }
 
@@ -232,8 +232,7 @@ pub struct EffectsAnalysis {
     pub power: f64,
     /// Number of effects that are screened.
     pub effects_screened: usize,
-    /// Significance level of a test of a single effect when all effects are screened and the probability of any false
-    /// alarm is `significance_level` (Šidák).
+    /// Significance level of a single effect when all effects are screened (Šidák).
     pub significance_level_corrected: f64,
     /// The effects.
     pub effects: Vec<EffectDetectability>,
@@ -248,8 +247,8 @@ pub struct EffectDetectability {
     pub family: String,
     /// Unit of its amplitude.
     pub unit: String,
-    /// Smallest amplitude that a test of this effect alone detects, in `unit`; of power 1 over a linear axis per metre, of
-    /// other powers at 100 mm or 180°. `null` where no amplitude of physical size is detectable.
+    /// Smallest amplitude that a test of this effect alone detects, in `unit`; of power 1 over a linear axis per metre,
+    /// of other powers at 100 mm or 180°. `null` where none of physical size is.
     pub detectable_amplitude: Option<f64>,
     /// Smallest amplitude that is detected when all effects are screened, in `unit`.
     pub detectable_amplitude_screened: Option<f64>,

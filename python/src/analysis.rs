@@ -46,7 +46,7 @@ pub struct Analysis {
 impl Analysis {
     /// Runs the analysis of a name; `options` is a JSON object. `progress` is called with words.
     #[staticmethod]
-    fn of(
+    fn run(
         py: Python<'_>,
         name: String,
         inputs: Vec<Input<'_>>,

@@ -118,7 +118,12 @@ fn line<A: Analysis>() -> Line {
         run: |given, options, seed, listener| {
             let unusable =
                 |cause: serde_json::Error| unusable(format!("an option of `{}` cannot be used: {cause}", A::NAME), "");
-            let options: A::Options = serde_json::from_str(options).map_err(unusable)?;
+            let named: Map<String, Value> = serde_json::from_str(options).map_err(unusable)?;
+            let known = serde_json::to_value(A::Options::default()).map_err(unusable)?;
+            if let Some(name) = named.keys().find(|name| known.get(name.as_str()).is_none()) {
+                return Err(Diagnostic::session(format!("`{}` has no option `{name}`", A::NAME), ""));
+            }
+            let options: A::Options = serde_json::from_value(Value::Object(named)).map_err(unusable)?;
             let stated = stated(&options).map_err(unusable)?;
             Ok((stated, Box::new(A::run(given, &options, seed, listener)?)))
         },
@@ -190,6 +195,6 @@ impl Analysed {
         }
         let fits = self.found.fits();
         let (problem, fit) = fits.last().ok_or_else(|| format!("a result of `{}` has no model", self.call.command))?;
-        Ok(IdentifiedModel::of_fit(problem, fit, origin.provenance(self.call.clone(), self.seed))?)
+        IdentifiedModel::of_fit(problem, fit, origin.provenance(self.call.clone(), self.seed))
     }
 }

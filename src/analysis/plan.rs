@@ -132,7 +132,7 @@ impl Analysis for Plan {
             effects: !options.no_effects,
             ..PlanOptions::default()
         };
-        Ok(Plan::of(session, problem_of(session, &options)?, &options)?)
+        Plan::of(session, problem_of(session, &options)?, &options)
     }
 }
 

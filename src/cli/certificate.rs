@@ -69,7 +69,7 @@ impl Wanted<'_> {
     /// # Errors
     /// If neither the file nor the session states a day and a serial number.
     pub fn of(&self, session: &Session) -> Result<Stated<'_>, Diagnostic> {
-        Ok(Stated::of(&self.data, session)?)
+        Stated::of(&self.data, session)
     }
 
     /// Writes the certificate.

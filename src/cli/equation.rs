@@ -62,7 +62,7 @@ impl EquationArguments {
             Some([none]) if none == "none" => &[],
             Some(axes) => axes,
         };
-        Ok(source.with_symbols(symbols)?)
+        source.with_symbols(symbols)
     }
 }
 

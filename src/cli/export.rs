@@ -85,7 +85,8 @@ pub struct ExportArguments {
     /// Example: --as heidenhain-tables --places 73
     #[arg(long, value_name = "N")]
     places: Option<usize>,
-    /// Position of an axis, mm or degrees, at which the entries of a table are 0 [default: 0; outside the table its first entry].
+    /// Position of an axis, mm or degrees, at which the entries of a table are 0 [default: the errors of the model; 0 at
+    /// the first entry if the table does not contain the position 0].
     ///
     /// Example: --as linuxcnc-tables --reference X=-400
     #[arg(long, value_name = "AXIS=POSITION", allow_hyphen_values = true)]

@@ -165,7 +165,7 @@ pub struct PlausibilityArguments {
 impl PlausibilityArguments {
     /// Refuses estimates that mean nothing and have a cause.
     fn check(self, found: &Plausibility) -> Result<(), Diagnostic> {
-        if self.allow_implausible { Ok(()) } else { Ok(plausibility::accepted(found)?) }
+        if self.allow_implausible { Ok(()) } else { plausibility::accepted(found) }
     }
 }
 
@@ -180,7 +180,7 @@ impl SessionArguments {
         let source = files::text(&self.session, "the session file")?;
         let (session, sources) = files::session_of(&source, &ReadOptions { read_data: false, ..self.options() })?;
         if needs(&session) && session.tests.iter().any(|test| matches!(test.motion, None | Some(Motion::List))) {
-            return Ok(files::session_of(&source, &self.options())?);
+            return files::session_of(&source, &self.options());
         }
         Ok((session, sources))
     }

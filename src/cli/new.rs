@@ -103,8 +103,7 @@ const PLAN_HEAD: &str = "# A plan. `abbe plan plan.toml` analyses which errors t
 fn of_code(code: &str, sizes: &SizeArguments) -> Result<Vec<NewFile>, Diagnostic> {
     let [machine, plan] = template::of_code(code, sizes.stated()).map_err(|mut error| {
         if error.code == UNKNOWN_AXIS_KIND {
-            error.message +=
-                "; `abbe new DIR --template ur10` shows a machine whose axes state their kind and direction";
+            error.message += "; `abbe new DIR --template ur10` shows one whose axes state their kind and direction";
         }
         error
     })?;

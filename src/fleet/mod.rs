@@ -27,17 +27,19 @@ pub mod unit;
 use std::fmt::Display;
 use std::path::Path;
 
-use abbe_identify::error::INTERRUPTED;
 use abbe_model::Diagnostic;
-use abbe_model::diagnostic::Location;
+use abbe_model::diagnostic::{Area, Code, Location};
 
 /// Version of the program and the first digits of the SHA-256 of the sources that determine results, such as
 /// `0.1.0+3fa2b1c9d4e5`. A change of these sources gives other keys.
 pub const BUILD: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("ABBE_SOURCES"));
 
+/// The caller ended the work.
+pub const INTERRUPTED: Code = Code { area: Area::Other, word: "interrupted" };
+
 /// The caller ended the work before the session was done.
 fn interrupted() -> Diagnostic {
-    Diagnostic { code: INTERRUPTED, ..Diagnostic::other("interrupted before the session was done") }
+    Diagnostic::coded(INTERRUPTED, "interrupted before the session was done")
 }
 
 fn unreadable(path: &Path, cause: std::io::Error) -> Diagnostic {

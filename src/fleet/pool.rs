@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use abbe_identify::error::INTERRUPTED;
+use super::INTERRUPTED;
 use abbe_model::Diagnostic;
 use rayon::prelude::*;
 

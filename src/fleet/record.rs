@@ -52,8 +52,8 @@ pub struct Record {
     pub error: Option<ErrorRecord>,
     /// Instrument: `ballbar`, `r-test`, …
     pub instrument: Option<String>,
-    /// The final model, with the found effects if there was a trace; `null` if there is none. Its keys end in `um` whatever
-    /// `reading_unit` is.
+    /// The final model, with the found effects; `null` if there is none. Its keys end in `um` where
+    /// `reading_unit` is `arcsec` too; the values are then in arcsec.
     pub model: Option<ModelResult>,
     /// Verdict of the trace; `null` without a trace.
     pub verdict: Option<TraceVerdict>,
@@ -98,7 +98,7 @@ pub struct ErrorRecord {
 /// Base parameters of the machine: all that the readings determine of it, with other parameters held at nominal.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BaseRecord {
-    /// The parameters that are held at nominal.
+    /// The parameters that are held at nominal, without those of combinations that the readings hardly determine.
     pub held: Vec<String>,
     /// The base parameters.
     pub parameters: Vec<Estimate>,
@@ -176,7 +176,7 @@ pub struct ValidationRecord {
     pub verdict: ValidationVerdict,
     /// Rms of the residual of the model, µm.
     pub rms_um: f64,
-    /// The parameters that have moved, the most significant first.
+    /// The parameters that have moved, the most significant first; empty if the model itself lacks an effect.
     pub moved: Vec<String>,
 }
 

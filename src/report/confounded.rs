@@ -64,12 +64,12 @@ pub fn section(report: &mut Report, model: &ModelResult) {
 fn outliers(outliers: &[Outlier], unit: Unit) -> Table {
     let firsts = outliers.iter().filter(|outlier| outlier.first_at_reversal).count();
     let readings = counted(outliers.len(), "reading");
-    let begin = "a run that begins where an axis reverses, so that its lost motion there is not known";
+    let begin = "a run that begins where an axis reverses: its lost motion there is not known";
     let title = match (outliers.len(), firsts) {
         (1, 0) => format!("{readings} is excluded as an outlier"),
         (_, 0) => format!("{readings} are excluded as outliers"),
-        (1, _) => format!("{readings} is excluded, the first of {begin}"),
-        (all, firsts) if firsts == all => format!("{readings} are excluded, each the first of {begin}"),
+        (1, _) => format!("{readings} is excluded, as the first of {begin}"),
+        (all, firsts) if firsts == all => format!("{readings} are excluded, each as the first of {begin}"),
         (_, firsts) => format!("{readings} are excluded as outliers, {firsts} of them the first of {begin}"),
     };
     let rows = outliers.iter().map(|o| cells![&o.test, &o.file, o.line.to_string(), of_readings(o.residual_um, unit)]);

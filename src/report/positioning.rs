@@ -2,6 +2,7 @@
 
 use abbe::identify::figure::{Figure, OF_DIAGONALS, POSITIONING, find};
 use abbe::identify::positioning::diagonal::{DiagonalKind, DiagonalTest, LargestOfDiagonals};
+use abbe::identify::positioning::uncertainty::COVERAGE;
 use abbe::identify::positioning::{Approach, Contributions, Deviations, Position, PositioningTest};
 
 use super::block::{Report, Text};
@@ -96,7 +97,7 @@ fn overview(tests: &[DiagonalTest], largest: &[LargestOfDiagonals]) -> Table {
 /// A figure and its expanded uncertainty, k = 2.
 fn value_and_expanded_u(figures: &[Figure], id: &str) -> [Cell; 2] {
     let found = find(figures, id);
-    let [value, u] = [found.map(|figure| figure.value), found.and_then(|figure| figure.u).map(|u| 2.0 * u)];
+    let [value, u] = [found.map(|figure| figure.value), found.and_then(|figure| figure.u).map(|u| COVERAGE * u)];
     [value, u].map(|number| Cell::or_dash(number.map(|number| Cell::fixed(number, 2))))
 }
 

@@ -290,7 +290,7 @@ pub fn of_validation(
         sentences.push(format!("What has changed: {volume}{moved}").into());
     }
     let correct = match (statements.changed.is_empty(), statements.good.verdict) {
-        (false, _) => "by a change alone nothing; a model of these readings states what remains",
+        (false, _) => "nothing from a change alone; a model of these readings states the errors that remain",
         (true, ValidationVerdict::Holds | ValidationVerdict::HoldsInRange) => "nothing; no parameter has moved",
         (true, ValidationVerdict::Degraded | ValidationVerdict::DoesNotHold) => {
             "no single parameter; the model lacks what these readings show"
@@ -321,7 +321,7 @@ fn before_validation(own: &ModelNotJudged, commands: &Commands) -> Vec<Sentence>
             "finds the effect behind the model",
         ),
         true => (
-            "what separates the effects that the trace of the model's own session left open",
+            "the test that separates the effects which the trace of the model's own session left open",
             of_session.command("trace", ""),
             "states what the model still lacks",
         ),
@@ -336,7 +336,10 @@ fn before_validation(own: &ModelNotJudged, commands: &Commands) -> Vec<Sentence>
 
 /// That no difference from a model that lacks an effect is judged.
 fn not_judged(name: &str, birge_ratio: f64, why: &str) -> String {
-    format!("What has changed: not judged; {name} (χ²/ν = {}): {why}", three_digits(birge_ratio.powi(2)))
+    format!(
+        "What has changed: not judged, because of {name} (χ²/ν = {}). There {why}",
+        three_digits(birge_ratio.powi(2))
+    )
 }
 
 /// What has changed, what to correct and to measure after a comparison.
@@ -363,7 +366,8 @@ pub fn of_comparison(
         }
         false => first_of(&changed.collect::<Vec<_>>(), NAMED, ", ", "further difference"),
     };
-    let correct = format!("What to correct: by a change alone nothing; the estimates of {last} state what remains");
+    let correct =
+        format!("What to correct: nothing from a change alone; the estimates of {last} state the errors that remain");
     let next = match statements.measure.step {
         NextStep::Repeat => {
             "the last session once more, mounted anew: it tells a change of the machine from one of the set-up"

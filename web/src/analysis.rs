@@ -26,7 +26,7 @@ impl Analysis {
     ///
     /// # Errors
     /// If the session cannot be used or its parameters cannot be estimated.
-    pub fn of(name: &str, folder: &Folder, session: &str, options: &str, seed: u32) -> Result<Analysis, Failed> {
+    pub fn run(name: &str, folder: &Folder, session: &str, options: &str, seed: u32) -> Result<Analysis, Failed> {
         let read = folder.read(session, true)?;
         let given = [Given::Session(&read.session)];
         let analysed = analysis::run(name, &given, options, u64::from(seed), &tell)?;

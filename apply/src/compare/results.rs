@@ -21,7 +21,7 @@ pub struct Comparison {
     pub pairs: Vec<Pair>,
     /// The readings that the fits of the sessions excluded as outliers.
     pub outliers: Vec<ExcludedReading>,
-    /// The inputs whose model lacks an effect, or whose readings are in a doubtful unit. Their differences are not judged.
+    /// The inputs whose differences are not judged: their model lacks an effect, or their unit is in doubt.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub not_judged: Vec<InputNotJudged>,
     /// The volumetric error over the common range of axes, one entry per input; empty if it was not evaluated.
@@ -92,12 +92,10 @@ pub struct Pair {
     pub p_value: f64,
     /// Set-up quantities that are the same object in both sessions.
     pub shared_setup: Vec<String>,
-    /// Set-up quantities of one name that are not shared, because the readings show that they, or others of their kind, are
-    /// not one object.
+    /// Set-up quantities of one name that the readings show to be several objects.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub not_shared: Vec<NotShared>,
-    /// Parameters without a difference of their own: one of the sessions does not separate them from others, and they
-    /// are held at nominal in both.
+    /// Parameters without a difference of their own: one of the sessions does not separate them from others.
     pub not_comparable: Vec<NotComparable>,
     /// Effects and errors that only one of the inputs has.
     pub only_in: Vec<OnlyIn>,

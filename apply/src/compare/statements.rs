@@ -16,7 +16,7 @@ pub struct ComparisonStatement {
     /// The inputs whose differences are not judged.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub not_judged: Vec<String>,
-    /// The volumetric error of each input over the common range, rms in µm; empty if it was not evaluated.
+    /// The volumetric error of each input over the common range, rms in µm; empty if not evaluated.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub volumetric_rms_um: Vec<f64>,
 }

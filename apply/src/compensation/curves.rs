@@ -223,7 +223,7 @@ pub fn of_model(model: &IdentifiedModel, references: &[(String, f64)]) -> Result
     for (name, _) in references {
         machine.axis_index(name).ok_or_else(|| error::no_axis(machine, "", name))?;
         if !result.curves.iter().any(|curve| curve.error.axis == *name) {
-            let found = "no table of the model is over it";
+            let found = "the model has no compensation table over it";
             let expected = "state the reference position of an axis whose error motions are written";
             return Err(error::not_applicable(format!("axis `{name}`"), found, expected));
         }

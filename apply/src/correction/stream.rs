@@ -54,8 +54,7 @@ pub struct Summary {
     pub largest_error_um: f64,
     /// Largest error of the orientation before, arcsec.
     pub largest_error_arcsec: f64,
-    /// Largest remaining error of the position among all rows that have a command, those that keep theirs included, µm;
-    /// `null` for errors. A pose that is not reachable has none.
+    /// Largest remaining error of the position over all rows that have a command; `null` for errors.
     pub largest_remaining_um: Option<f64>,
     /// The same of the orientation, arcsec; `null` for errors.
     pub largest_remaining_arcsec: Option<f64>,

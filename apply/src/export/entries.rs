@@ -52,8 +52,8 @@ pub struct Remaining {
     pub plain: Size,
     /// With the entries that are written.
     pub written: Size,
-    /// Whether base and target are presumed to be set up anew, as in the model: a shift and a rotation of the base and an
-    /// offset of the target are no errors. Otherwise only the zero of the workpiece is.
+    /// Whether base and target are presumed to be set up anew, so that their shifts are no errors; otherwise only the
+    /// zero of the workpiece is.
     pub set_up_anew: bool,
 }
 

@@ -122,8 +122,8 @@ pub struct KinematicTable {
     pub tool_mm: [f64; 3],
     /// The volumetric error over the travel. A constant vector in the table frame, the zero of the workpiece, is none.
     pub remaining: Remaining,
-    /// What the control's model does not represent, by error or effect: rms over the travel that the best entries leave
-    /// of each alone, the largest first.
+    /// What the control's model does not represent: rms over the travel that the best entries leave of each, the
+    /// largest first.
     pub not_represented: Vec<NotRepresented>,
     /// Entries that the readings do not determine, and identified errors that the entries cannot hold, with the reason.
     pub left_out: Vec<String>,

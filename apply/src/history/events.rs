@@ -64,8 +64,8 @@ pub struct ChangeEvent {
     pub before_days: f64,
     /// What it is.
     pub kind: Kind,
-    /// Cosine between the change and the known compensation, or between the change and the way to zero; in the metric
-    /// of the inverse covariance.
+    /// Cosine between the change and the known compensation, or the way to zero, in the metric of the inverse
+    /// covariance.
     pub direction_cosine: f64,
     /// χ² of the change of all parameters.
     pub chi_square: f64,

@@ -14,7 +14,7 @@ use super::events::ChangeEvent;
 pub struct History {
     /// False discovery rate over all series of all machines.
     pub false_discovery_rate: f64,
-    /// The p value below which a series has a change, by the procedure of Benjamini and Hochberg; 0 if none has.
+    /// The p value below which a series has a change (Benjamini and Hochberg); 0 if none has.
     pub p_value_threshold: f64,
     /// Number of series that were tested.
     pub tested_series: usize,
@@ -66,7 +66,7 @@ pub struct MachineHistory {
     /// The parameters that are held at nominal, so that the others have values.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub held_at_nominal: Vec<String>,
-    /// The verdict of the validation of the latest session, if the model of the machine does not hold; absent otherwise.
+    /// The verdict of the validation of the latest session, if its model does not hold.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub validation: Option<ValidationVerdict>,
     /// The parameters.
@@ -100,8 +100,8 @@ pub struct ParameterHistory {
     pub p_value: f64,
     /// Scatter of the sessions about the model (level, drift and steps) over that which the uncertainties predict.
     pub scatter_ratio: f64,
-    /// Factor by which `u` is enlarged: `scatter_ratio` beside the scatter of the other parameters of the machine and of
-    /// the other machines, by their degrees of freedom; at least 1.
+    /// Factor by which `u` is enlarged, at least 1: `scatter_ratio`, pooled over the machine's other parameters and
+    /// other machines.
     #[serde(rename = "u_enlargement")]
     pub enlargement: f64,
     /// Level: at the mean date of a series with drift, before the first step; `null` if the model is not separable.

@@ -196,7 +196,7 @@ pub fn read(path: &Path, machine: &Machine) -> Result<Vec<ErrorFunction>, Diagno
 /// # Errors
 /// As [`read`].
 pub fn of_source(source: &Source, machine: &Machine) -> Result<Vec<ErrorFunction>, Diagnostic> {
-    Ok(lowered(source, |file: &File| {
+    lowered(source, |file: &File| {
         let mut functions = Vec::new();
         for (id, quantity) in &file.constant.0 {
             let constant = constant(machine, id, quantity).map_err(|fault| fault.on_key().at(id));
@@ -206,7 +206,7 @@ pub fn of_source(source: &Source, machine: &Machine) -> Result<Vec<ErrorFunction
             functions.push(function(machine, entry).within_item(item).within("function")?);
         }
         Ok(functions)
-    })?)
+    })
 }
 
 fn constant(machine: &Machine, id: &str, quantity: &str) -> Result<ErrorFunction, Fault> {

@@ -51,8 +51,7 @@ pub struct DirectionFigures {
     pub direction: String,
     /// Number of runs.
     pub runs: usize,
-    /// Figures of this direction: G, F. A rotary axis that makes a full turn with the linear axes at rest and the bar radial
-    /// to the axis has error motions, the asynchronous one for several runs.
+    /// Figures of this direction: G, F, and the error motions of a rotary axis that makes a full turn alone.
     pub figures: Vec<Figure>,
 }
 
@@ -64,9 +63,9 @@ pub struct Diagnosis {
     pub fault: String,
     /// The axis, or the two axes.
     pub axes: String,
-    /// Its estimates. Those of one axis have the sign of the error motion of that axis along R, as the effect of the
-    /// same name: `backlash` of X that of `EXX~X:backlash`, `lateral play` that of `EYX~X:backlash`, `straightness`
-    /// that of `EYX~X:power2`, `squareness` of X and Y that of `EC0Y`.
+    /// Its estimates, with the signs of the error motions along R: `backlash` of X is that of `EXX~X:backlash`,
+    /// `lateral play` that of `EYX~X:backlash`, `straightness` that of `EYX~X:power2`, `squareness` of X and Y that of
+    /// `EC0Y`.
     pub values: Vec<Estimate>,
     /// Contribution to the path, largest less smallest radius, µm.
     pub circularity_um: f64,

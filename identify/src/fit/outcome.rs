@@ -1,7 +1,7 @@
 //! What a fit is worth: its residual against the noise, what determines its estimates, what it assumes.
 
 use abbe_model::Diagnostic;
-use abbe_model::instrument::Checked;
+use abbe_model::instrument::{Checked, InstrumentKind};
 use abbe_model::parameter_id::ParameterId;
 use abbe_model::session::{Prior, Test};
 use abbe_model::words::counted;
@@ -64,7 +64,9 @@ pub(crate) fn doubt_on_unit(problem: &Problem) -> Option<String> {
     let machine = &problem.session.machine;
     let doubt =
         |test: &Test| test.station.doubt(&Checked { machine, test: &test.name, readings: test.readings.as_deref()? });
-    problem.tests.iter().find_map(doubt).filter(|_| problem.session.stated_noise_mm().is_none())
+    // What is doubtful of a line of sight is no unit.
+    let has_unit = |test: &&Test| test.station.kind() != InstrumentKind::Pointing;
+    problem.tests.iter().filter(has_unit).find_map(doubt).filter(|_| problem.session.stated_noise_mm().is_none())
 }
 
 /// What determines each parameter of a problem, by index, and the errors that set-up priors determine, in words.

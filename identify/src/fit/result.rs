@@ -31,7 +31,7 @@ pub struct FitResult {
     /// Figures of ISO 230-6 of the tests in which a laser reads along a diagonal.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub diagonals: Vec<DiagonalTest>,
-    /// The largest of them, for body and for face diagonals.
+    /// The largest figures over the body diagonals, and over the face diagonals.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub largest_of_diagonals: Vec<LargestOfDiagonals>,
     /// Straightness of axes by ISO 230-1, from tests in which one linear axis moves under a laser.

@@ -8,7 +8,7 @@ use abbe_model::document::machine::Machine;
 use abbe_model::document::print;
 use abbe_model::document::value::{Json, Long, Positive};
 use abbe_model::parameter_id::ParameterId;
-use abbe_model::unit::Unit;
+use abbe_model::unit::{Unit, reading};
 use schemars::JsonSchema;
 use serde::ser::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -52,8 +52,8 @@ pub struct Document {
     pub locations: Long<Vec<Location>>,
     /// The unit of the figures of readings, noise and residuals: absent for µm, `arcsec` of a session of angles, whose
     /// figures stand under the same keys.
-    #[serde(default, skip_serializing_if = "Unit::is_micrometre")]
-    #[schemars(with = "String")]
+    #[serde(default, skip_serializing_if = "Unit::is_micrometre", deserialize_with = "reading::deserialize")]
+    #[schemars(schema_with = "reading::schema")]
     pub reading_unit: Unit,
     /// The noise of a reading.
     pub noise: Noise,
@@ -61,7 +61,7 @@ pub struct Document {
     pub fit: ModelFit,
     /// The range of every axis and driver that the readings covered.
     pub ranges: Vec<Range>,
-    /// The ranges of each error motion that is a function of the position of its own axis; absent without such errors.
+    /// The ranges of each error motion over its own axis.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub motion_ranges: Vec<MotionRange>,
     /// The instrument's point in the tool frame at the first test.
@@ -247,8 +247,7 @@ pub struct Range {
 pub struct MotionRange {
     /// `EXX`, …
     pub error: String,
-    /// Least and greatest position of each unconnected range, mm or rad, the longest range first; empty if the axis stood
-    /// still.
+    /// Least and greatest position of each unconnected range, mm or rad, the longest first.
     pub internal: Vec<[f64; 2]>,
 }
 

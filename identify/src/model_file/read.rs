@@ -41,7 +41,7 @@ const SAVE_AGAIN: &str = "save the model again";
 /// If the file cannot be read, is no model, is of a newer version, or was changed by hand: the file, the line, the key,
 /// what was found and what to do.
 pub fn read(path: &Path) -> Result<IdentifiedModel, Diagnostic> {
-    Ok(of_source(&abbe_files::text(path, "the model file")?)?)
+    of_source(&abbe_files::text(path, "the model file")?)
 }
 
 /// Whether a text is meant as a saved model rather than a session. A model is JSON; no session begins with a brace.

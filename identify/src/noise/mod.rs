@@ -20,11 +20,10 @@ mod waves;
 
 use abbe_model::session::Test;
 use abbe_model::session::readings::Readings;
-
+use abbe_model::unit::{Unit, reading};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use abbe_model::unit::Unit;
 pub(crate) use autocorrelation::enlargement_of_mean;
 pub use autocorrelation::{Autocorrelation, Process, along_runs};
 pub(crate) use stated::silent_channels;
@@ -97,17 +96,16 @@ impl std::fmt::Display for NoiseSource {
 /// The noise of one scalar reading, as JSON has it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ReadingNoise {
-    /// The unit of the figures of readings, in which their keys end; absent for µm.
+    /// `arcsec` if all readings are angles: the keys of the figures of readings then end in it. Absent for µm.
     #[serde(rename = "reading_unit", default, skip_serializing_if = "Unit::is_micrometre")]
-    #[schemars(with = "String")]
+    #[serde(deserialize_with = "reading::deserialize")]
+    #[schemars(schema_with = "reading::schema")]
     pub unit: Unit,
     /// Standard deviation of one scalar reading, µm.
     #[serde(rename = "noise_um")]
     pub value: f64,
-    /// Source of `noise_um`: `stated` by session or user, `repeats` or `targets` (readings of the same), `residual` where
-    /// there is none of these, `assumed` without readings. The residual of the declared model also holds what the model
-    /// lacks. Of a validation `model`: the noise of the model's readings where the session has none; the model's held-out
-    /// rms where the model's readings have none either.
+    /// Source of `noise_um`: `stated`, `repeats` (repeated readings), `targets` (several targets at each pose), `residual`
+    /// (noise and what the model lacks), `assumed`, or of a validation `model`: that of the model's readings.
     #[serde(rename = "noise_source")]
     pub source: NoiseSource,
 }

@@ -250,13 +250,15 @@ fn residual(problem: &Problem, fit: &Fit) -> Option<Conflict> {
     })
 }
 
-/// Units in which readings are likely, in the form "mm under µm", by the share that the residual is of the stated noise.
-const OF_LENGTHS: [(f64, &str); 2] =
-    [(1e-3, "mm under µm, or m under mm"), (1.0 / 25.4, "inches under mm, or thousandths of an inch under µm")];
+/// Units in which readings are likely, in the form "mm in a column named µm", by the share that the residual is of the stated noise.
+const OF_LENGTHS: [(f64, &str); 2] = [
+    (1e-3, "mm in a column named µm, or m in one named mm"),
+    (1.0 / 25.4, "inches in a column named mm, or thousandths of an inch in one named µm"),
+];
 const OF_ANGLES: [(f64, &str); 3] = [
-    (1.0 / 60.0, "arcminutes under arcseconds, degrees under arcminutes, or radians under degrees"),
-    (1.0 / 3600.0, "degrees under arcseconds"),
-    (RAD_PER_ARCSEC, "radians under arcseconds"),
+    (1.0 / 60.0, "arcminutes in a column named arcsec, or radians in one named degrees"),
+    (1.0 / 3600.0, "degrees in a column named arcsec"),
+    (RAD_PER_ARCSEC, "radians in a column named arcsec"),
 ];
 
 /// The unit in which readings are likely whose residual is this share of the stated noise.
@@ -279,7 +281,7 @@ fn of_another_unit(problem: &Problem, fit: &Fit) -> Option<Conflict> {
         pull: None,
         words: format!(
             "the residual is {:.0} times smaller than the stated noise of {}: the readings are probably in another unit than \
-             the name of their column states ({}), or were divided before; check them, or `noise_{unit}`",
+             the name of their column states (possibly {}), or were divided before; check them, or `noise_{unit}`",
             ratio.max(f64::MIN_POSITIVE).recip().min(LARGEST_FACTOR),
             unit.text(stated_mm * 1e3, 3),
             likely_unit(ratio, unit),

@@ -38,7 +38,7 @@ pub enum ConflictKind {
     LocationError,
     /// The zero angle of a joint is more than 10°, beyond its expanded uncertainty.
     ZeroAngle,
-    /// The session with one of the suggestions fits far better.
+    /// The session, or for poses its nominal machine, fits far better with one of the suggestions.
     Statement,
 }
 
@@ -53,11 +53,11 @@ pub struct Conflict {
     /// residual of the orientations, or the location error; in `unit`.
     pub value: f64,
     /// What it is compared with, in `unit`: the stated standard uncertainty, the degrees of freedom, the noise, the least
-    /// share, or the limit.
+    /// share, the limit, or the residual with the best suggestion.
     pub stated: f64,
     /// Unit of `value` and `stated`; `1` for none.
     pub unit: String,
-    /// For a set-up parameter: the pull, that is the estimate over its standard deviation if the session is right.
+    /// For a set-up parameter: the estimate over its standard deviation if the session is right.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pull: Option<f64>,
     /// Description in words.
@@ -89,7 +89,7 @@ pub enum SuggestionKind {
     ColumnUnit,
     /// A column has the opposite sign.
     ColumnSign,
-    /// Two columns are exchanged.
+    /// Columns are exchanged, or hold poses or rotations by another convention.
     ColumnsExchanged,
     /// The machine comes from a table of Denavit–Hartenberg parameters that was read in the other convention.
     DhConvention,
@@ -102,7 +102,7 @@ pub struct Suggestion {
     pub kind: SuggestionKind,
     /// The axes, the test, the column or the thing of the set-up.
     pub subject: String,
-    /// Residual over scalar readings with the change, µm.
+    /// Residual over scalar readings with the change, µm; of poses that of the nominal machine.
     pub rms_um: f64,
     /// Description in words.
     #[serde(rename = "description")]

@@ -40,8 +40,7 @@ pub struct DiagonalTest {
     pub kind: DiagonalKind,
     /// The axes that move, in the order of the machine X, Y, Z.
     pub axes: Vec<String>,
-    /// Whether each axis rises (P) or falls (N) in the positive direction of the diagonal, in the order of `axes`: `PPP`,
-    /// `NPP`, … Most of them rise.
+    /// Whether each of `axes` rises (P) or falls (N) along the diagonal: `PPP`, `NPP`, …
     pub direction: String,
     /// Whether the axes move one after the other (step diagonal).
     #[serde(skip_serializing_if = "std::ops::Not::not")]

@@ -3,7 +3,7 @@
 
 pub mod diagonal;
 mod figures;
-mod uncertainty;
+pub mod uncertainty;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
@@ -42,7 +42,8 @@ pub struct Deviations {
     pub position_unit: String,
     /// The positions, ascending; along a diagonal from its start.
     pub positions: Vec<Position>,
-    /// The figures of ISO 230-2: with standard uncertainties, if the test states contributors.
+    /// The figures as ISO 230-2 defines them; ISO 230-6 applies them to diagonals. With standard uncertainties if the test
+    /// states contributors.
     pub figures: Vec<Figure>,
     /// The contributors to these uncertainties.
     #[serde(skip_serializing_if = "Option::is_none")]

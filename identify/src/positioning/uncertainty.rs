@@ -22,7 +22,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 /// The coverage factor.
-const COVERAGE: f64 = 2.0;
+pub const COVERAGE: f64 = 2.0;
 
 /// Expanded uncertainties of positioning figures by each contributor, in the unit of the figures.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]

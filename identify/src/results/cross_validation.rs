@@ -6,8 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Held-out errors of a model, by what is held out. Absent where the readings or the tests do not permit it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CrossValidation {
-    /// For poses: rms of the residual over held-out random poses, µm. It tests interpolation. The effects of `trace`
-    /// are those found on all poses.
+    /// For poses: rms of the residual over held-out random poses, µm: interpolation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interpolation_rms_um: Option<f64>,
     /// For poses: rms length of the residual vector over held-out random poses, µm.
@@ -25,8 +24,8 @@ pub struct CrossValidation {
     /// For runs: rms length of the residual vector over left-out runs, µm, for instruments with three coordinates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_out_run_rms_3d_um: Option<f64>,
-    /// Rms of the residual of `left_out_tests`, µm: each is predicted by the model of the other tests; only the set-up
-    /// parameters that no other test has are estimated on it.
+    /// Rms of the residual of `left_out_tests`, µm: each is predicted by the model of the others; its own set-up alone
+    /// is estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_out_test_rms_um: Option<f64>,
     /// Rms length of the residual vector of `left_out_tests`, µm, for instruments with three coordinates.
@@ -45,7 +44,6 @@ pub struct CrossValidation {
 pub struct TestNotLeftOut {
     /// The test.
     pub test: String,
-    /// The parameters of the least identified direction that the test needs, the largest share first: the other tests
-    /// predict the readings with a larger uncertainty than the noise.
+    /// The parameters of the least identified direction that the test needs, the largest share first.
     pub parameters: Vec<String>,
 }

@@ -31,8 +31,8 @@ pub enum NotJudged {
     NoNoise,
     /// χ²/ν is significantly below 0.5 (p < 0.001): the noise is overstated.
     BelowNoise,
-    /// The residual is less than a tenth of the stated noise, or, without one, the readings have a size that such an instrument
-    /// does not have: probably the unit of the readings is not the stated one.
+    /// The readings probably have another unit: the residual is less than a tenth of the stated noise, or no such
+    /// instrument reads such sizes.
     WrongUnit,
     /// The readings are as many as the parameters that they determine.
     NoDegreesOfFreedom,
@@ -71,15 +71,14 @@ pub struct Goodness {
     pub not_judged: Option<NotJudged>,
     /// χ²/ν.
     pub chi_square_ratio: f64,
-    /// Probability of a larger χ² if the model lacks nothing; absent if the residual is taken for noise. For a noise
-    /// from repeats it is that of the lack-of-fit test against their pure error.
+    /// Probability of a larger χ² if the model lacks nothing; absent if the residual is taken for noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub p_value: Option<f64>,
-    /// Whether estimates that the readings determine may be quoted with their uncertainties. Not while the model lacks
-    /// an effect, or the unit of the readings is in doubt.
+    /// Whether estimates may be quoted with their uncertainties: not while the model lacks an effect or the unit of the
+    /// readings is in doubt.
     pub quotable: bool,
-    /// Whether the uncertainties cover everything that is known to be wrong with the model. They do not cover the bias
-    /// by an effect that the model lacks.
+    /// Whether the uncertainties cover everything that is known to be wrong with the model. They do not cover a lacking
+    /// effect.
     pub u_covers_model: bool,
 }
 
@@ -135,8 +134,7 @@ impl Goodness {
 pub struct DeterminedByPrior {
     /// The error.
     pub error: String,
-    /// A change of the error and the set-up parameters in this proportion changes no reading. Display units; the error
-    /// first.
+    /// A change in this proportion changes no reading. Display units; the error first.
     #[serde(serialize_with = "Combination::serialize_pairs", deserialize_with = "Combination::pairs")]
     #[schemars(with = "Combination")]
     pub combination: Vec<(String, f64)>,

@@ -68,13 +68,12 @@ pub struct Estimate {
     pub expanded_u: f64,
     /// Unit of `value`, `u` and `expanded_u`: `um`, `arcsec`, `deg`, …
     pub unit: String,
-    /// Whether `|value|` exceeds `expanded_u`. For a phase: whether its amplitude does. `false` where `u` is not
-    /// quantified, and where the readings alone do not determine the parameter.
+    /// Whether `|value|` exceeds `expanded_u` (for a phase: whether its amplitude does) and the readings alone
+    /// determine the parameter.
     pub significant: bool,
     /// What determines the estimate: the readings, or the set-up priors only.
     pub determined_by: DeterminedBy,
-    /// Whether the estimate may be quoted with its uncertainty: the readings determine it, and the model lacks no
-    /// effect.
+    /// Whether the estimate may be quoted with its uncertainty.
     pub quotable: bool,
     /// The aliases of effects that enlarge `u`, one for each effect, if any does.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -155,9 +154,9 @@ pub struct MeasuredValue {
 pub struct ParameterChange {
     /// Identifier.
     pub id: String,
-    /// Its change, in `unit`.
+    /// Its change, in `unit`: the value in the other input less that in the first, now less in the model, after less before.
     pub value: f64,
-    /// Standard uncertainty of the change, in `unit`.
+    /// Standard uncertainty of the change, in `unit`; of `changed_parameters` that of the estimate in `after`.
     pub u: f64,
     /// Unit of `value` and `u`.
     pub unit: String,
@@ -186,8 +185,8 @@ pub enum Finding {
 /// A combination of parameters that is not identifiable.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Unobservable {
-    /// Coefficient of each parameter, in the parameter's display unit. A change of all parameters in this proportion
-    /// changes no reading, or by less than the noise.
+    /// Coefficient of each parameter, in its display unit. A change in this proportion changes no reading by more than
+    /// the noise.
     pub combination: BTreeMap<String, f64>,
     /// Whether it changes no reading, or readings by less than their noise.
     pub finding: Finding,

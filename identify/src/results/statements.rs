@@ -17,8 +17,7 @@ pub enum LineQuantity {
     Point,
     /// A component of the unit vector of an axis.
     Direction,
-    /// The position of the axis where its command is zero, in its own positive direction: degrees of a rotary axis (the zero
-    /// angle of a joint), mm of a linear one.
+    /// The position of the axis where its command is zero: degrees of a rotary axis, mm of a linear one.
     Zero,
 }
 
@@ -125,7 +124,7 @@ pub struct MeasureStatement {
     /// Name of the test in the session that the command writes; absent if no test is proposed yet.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub test: Option<String>,
-    /// The test in words.
+    /// The test in words; of `all-determined` the rank, of `check-unit` the likely unit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub description: Option<String>,
     /// The effect that it separates from its aliases.
@@ -145,15 +144,13 @@ impl From<NextStep> for MeasureStatement {
 pub struct Statements<G = GoodStatement, C = AxisCorrection> {
     /// Is the result good.
     pub good: G,
-    /// What to correct: of a fit and a trace the line of each axis whose location errors are identified, of a plan what of
-    /// the set-up limits its worst error, of a history what drifts or has shifted; of a comparison and a validation nothing.
+    /// What to correct; of a plan what limits its worst error. Empty for a comparison and a validation.
     pub correct: Vec<C>,
-    /// Of a comparison and a validation: what has changed. A change is no error that remains. Of a history: steps that a
-    /// known compensation or a way to zero explains.
+    /// What has changed, which is no error that remains; of a history steps that are explained.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub changed: Vec<C>,
-    /// Of a fit and a trace: what else exceeds its expanded uncertainty and is no set-up parameter, the most significant
-    /// coefficient of each effect and errors that move no axis line.
+    /// What else exceeds its expanded uncertainty: effects, and errors that move no axis line, without set-up
+    /// parameters.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub further: Vec<Estimate>,
     /// What to measure next.

@@ -25,8 +25,7 @@ pub struct FunctionPoint {
     pub at_deg: f64,
     /// Value, µm; `null` where it is not identifiable.
     pub value_um: Option<f64>,
-    /// Standard uncertainty of the value by the law of propagation (JCGM 100, 5.2), µm; 0 where a boundary condition
-    /// fixes the value.
+    /// Standard uncertainty of the value; 0 where a boundary condition fixes it.
     pub u_um: Option<f64>,
 }
 

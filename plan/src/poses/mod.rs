@@ -86,8 +86,8 @@ pub struct PoseSelection {
     /// A bound of the criterion: no set of as many candidates reaches a smaller value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bound: Option<f64>,
-    /// Median of its values for 100 random sets of as many candidates; infinite (`null` in JSON) if more than half of
-    /// them leave an error undetermined.
+    /// Median of its values for 100 random sets of as many candidates; `null` if more than half leave an error
+    /// undetermined.
     #[schemars(with = "Option<f64>")]
     pub random_median: f64,
     /// The noise of a reading.

@@ -127,7 +127,7 @@ class Session:
 
 class Analysis:
     @staticmethod
-    def of(
+    def run(
         name: str,
         inputs: Sequence[Session | Model],
         options: str,

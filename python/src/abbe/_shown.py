@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from . import _abbe
+from ._errors import SessionError
 from ._record import Record
 
 if TYPE_CHECKING:
@@ -216,10 +218,13 @@ class Shown(Record):
         super().__init__(json.loads(self._handle.json()) if source is None else source)
 
     def _analysed(self, progress: Callable[[str], object] | None = None) -> _abbe.Analysis:
+        for name, value in self._options.items():
+            if isinstance(value, float) and not math.isfinite(value):
+                raise SessionError(f"`{name}` is {value}", help="a finite number is expected")
         # Numbers of NumPy become those of Python.
         options = json.dumps(self._options, default=lambda value: value.tolist())
         handles = [given._handle for given in self._inputs]
-        return _abbe.Analysis.of(self._analysis, handles, options, self._seed, progress)
+        return _abbe.Analysis.run(self._analysis, handles, options, self._seed, progress)
 
     @property
     def _handle(self) -> _abbe.Analysis:

@@ -4,9 +4,9 @@ mod history;
 mod run;
 mod study;
 
+use abbe::fleet::INTERRUPTED;
 use abbe::fleet::pool::{self, Pooled, ShouldContinue};
 use abbe::fleet::store::IfClaimed;
-use abbe::identify::error::INTERRUPTED;
 use abbe::model::Diagnostic;
 use clap::{Args, Subcommand};
 

@@ -38,7 +38,7 @@ pub fn study(arguments: &PaperArguments, label: String, session: &Session) -> Re
 }
 
 fn named(problem: &Problem, ids: &[String]) -> Result<Vec<Effect>, Diagnostic> {
-    ids.iter().map(|id| Ok(effect(problem, id)?)).collect()
+    ids.iter().map(|id| effect(problem, id)).collect()
 }
 
 /// The requested parts that the sessions have.

@@ -44,6 +44,6 @@ impl GlobalArguments {
                 "`--vary {text}`: half the range or a standard deviation is expected, a number above 0"
             )));
         }
-        Ok(global(problem, &GlobalOptions { samples: self.samples, seed, vary })?)
+        global(problem, &GlobalOptions { samples: self.samples, seed, vary })
     }
 }

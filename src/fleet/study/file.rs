@@ -201,7 +201,7 @@ pub fn read(path: &Path) -> Result<Study, Diagnostic> {
         if session.units().angles {
             let what = format!("plan `{}` reads angles, and a study draws noise of lengths", plan.name);
             let fault = Fault::new(what, "study its tests of lengths alone").at("session").at_item(item).at("plan");
-            return Err(here(fault).into());
+            return Err(here(fault));
         }
         let own: Vec<Option<Effect>> = per_effect(&file, |effect| declared(effect, &session)).map_err(here)?;
         let of_plan = |error: Diagnostic| {

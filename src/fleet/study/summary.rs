@@ -16,7 +16,7 @@ pub struct Rate {
     pub of: usize,
     /// The proportion; 0 of none.
     pub rate: f64,
-    /// Its standard error, by the rule of succession: of `(count + 1)/(of + 2)`, so that it is not zero at 0 and 1.
+    /// Its standard error, by the rule of succession.
     pub u: f64,
 }
 
@@ -48,8 +48,7 @@ pub struct Cell {
     pub failed: usize,
     /// Number of draws, of those with a result, whose effect the plan does not observe.
     pub not_observed: usize,
-    /// The true effect is named or among the aliases; of traces with an effect, and of those whose effect the plan does
-    /// not observe.
+    /// The true effect is named or among the aliases; of traces with an effect.
     pub found: Rate,
     /// The true effect is named; of those in which it is found.
     pub named: Rate,
@@ -76,8 +75,7 @@ pub struct StudyResult {
     /// Each effect over all plans and kinds of noise.
     pub effects: Vec<Cell>,
     /// The plans over all effects and kinds of noise, best first: by the number of location errors that are not
-    /// determined, then by the mean uncertainty of the others. Not by power: sizes are multiples of the smallest
-    /// significant size of each plan, so that equal sizes are larger effects in a worse plan.
+    /// determined, then by the mean uncertainty of the others.
     pub ranking: Vec<Cell>,
 }
 

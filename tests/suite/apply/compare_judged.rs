@@ -139,5 +139,5 @@ fn a_correction_is_a_change_by_which_the_error_falls() {
     let volume = format!("the volumetric error falls from {before_um:.2} to {after_um:.2} \u{b5}m rms");
     assert!(first.contains(&volume), "{first}");
     let place = |words: &str| screen.find(words).unwrap_or_else(|| panic!("{words} in {screen}"));
-    assert!(place("What has changed: ") < place("What to correct: by a change alone nothing"));
+    assert!(place("What has changed: ") < place("What to correct: nothing from a change alone"));
 }

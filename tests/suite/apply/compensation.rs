@@ -411,7 +411,7 @@ fn a_table_has_its_zero_at_the_reference_position() {
     let out = folder.path().join("none");
     for (format, reference, code, expected) in [
         ("linuxcnc-tables", "X=600", 1, "the reference position of X in the table of EXX"),
-        ("linuxcnc-tables", "Y=0", 1, "axis `Y`: no table of the model is over it"),
+        ("linuxcnc-tables", "Y=0", 1, "axis `Y`: the model has no compensation table over it"),
         ("linuxcnc-tables", "W=0", 1, "no axis `W`"),
         ("linuxcnc-tables", "X", 2, "AXIS=POSITION is expected"),
         ("table", "X=300", 2, "`--reference` belongs to `--as linuxcnc-tables`"),

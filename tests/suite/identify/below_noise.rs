@@ -84,7 +84,7 @@ fn deviations_in_mm_under_um_pass_nothing() {
             assert_eq!(parameter["quotable"], false, "{parameter}");
         }
         assert_eq!(found["conflicts"][0]["kind"], "unit");
-        let advice = "nothing before the unit of the readings is checked: probably mm under µm";
+        let advice = "nothing before the unit of the readings is checked: possibly mm in a column named µm";
         assert!(screen.contains(advice) && !screen.contains("or state"), "{screen}");
         assert_eq!(found["statements"]["measure"]["step"], "check-unit");
     }

@@ -53,7 +53,10 @@ ABBE_UPDATE_PAGES=1 cargo test --profile checked -p abbe --test main json_page
 
 A unit stands in the name of a field (`_um` µm, `_mm` mm, `_deg` °, `_min` min, `_sigma` standard deviations of the noise) or in a
 field `unit` beside it (`um`, `arcsec`, `deg`, `um/K`, …). `u` is a standard uncertainty, `expanded_u` is 2 `u`. Numbers that do not
-exist are `null`. A field marked *optional* is absent where it does not apply.
+exist are `null`. A field without a type is a number, `number[]` is an array, `number?` may be `null`; a field with `?` after its
+name is absent where it does not apply.
+What several objects have in common stands once: an object lists the names of [common fields](#common-fields) that it has, and
+names another object whose fields it has too.
 
 `schema_version` is 3. It increases when a field changes its name or its meaning, or is removed; new fields leave it unchanged.
 ";
@@ -64,7 +67,7 @@ pub(super) fn schema(subject: &str) -> Value {
     serde_json::from_slice(&printed.stdout).unwrap()
 }
 
-/// The type of a field, with a link to an object of the page.
+/// The type of a field, with a link to an object of the page: `number[]` for an array, `number?` for what may be `null`.
 pub(super) fn kind(schema: &Value) -> String {
     if let Some(reference) = schema["$ref"].as_str() {
         let name = reference.rsplit('/').next().unwrap();
@@ -73,30 +76,35 @@ pub(super) fn kind(schema: &Value) -> String {
     if let Some(word) = schema["const"].as_str() {
         return format!("`\"{word}\"`");
     }
-    for key in ["anyOf", "oneOf", "allOf"] {
-        if let Some(choices) = schema[key].as_array() {
-            let kinds: Vec<String> = choices.iter().map(kind).collect();
-            return kinds.join(" or ");
-        }
-    }
-    if schema["type"].is_null()
-        && let Some(words) = schema["enum"].as_array()
-    {
-        return words.iter().map(|word| format!("`{word}`")).collect::<Vec<_>>().join(" or ");
-    }
-    let names: Vec<&str> = match &schema["type"] {
-        Value::String(name) => vec![name],
-        Value::Array(names) => names.iter().filter_map(Value::as_str).collect(),
-        _ => vec!["any"],
+    let choices = ["anyOf", "oneOf", "allOf"].iter().find_map(|key| schema[key].as_array());
+    let kinds: Vec<String> = if let Some(choices) = choices {
+        choices.iter().map(kind).collect()
+    } else if let Some(words) = schema["enum"].as_array().filter(|_| schema["type"].is_null()) {
+        words.iter().map(|word| format!("`{word}`")).collect()
+    } else {
+        let names: Vec<&str> = match &schema["type"] {
+            Value::String(name) => vec![name],
+            Value::Array(names) => names.iter().filter_map(Value::as_str).collect(),
+            _ => vec!["any"],
+        };
+        let kind_named = |name: &&str| match *name {
+            "array" => match kind(&schema["items"]) {
+                items if items.contains(" or ") => format!("({items})[]"),
+                items => format!("{items}[]"),
+            },
+            "object" if schema["additionalProperties"].is_object() => {
+                format!("object of {}", kind(&schema["additionalProperties"]))
+            }
+            name => name.to_string(),
+        };
+        names.iter().map(kind_named).collect()
     };
-    let of = |name: &&str| match *name {
-        "array" => format!("array of {}", kind(&schema["items"])),
-        "object" if schema["additionalProperties"].is_object() => {
-            format!("object of {}", kind(&schema["additionalProperties"]))
-        }
-        name => name.to_string(),
-    };
-    names.iter().map(of).collect::<Vec<_>>().join(" or ")
+    if kinds == ["null"] {
+        return "null".to_string();
+    }
+    let others: Vec<&str> = kinds.iter().map(String::as_str).filter(|kind| *kind != "null").collect();
+    let mark = if others.len() < kinds.len() { "?" } else { "" };
+    format!("{}{mark}", others.join(" or "))
 }
 
 /// The unit of a field by its name, or by its description.
@@ -128,78 +136,143 @@ pub(super) fn one_line(text: &str) -> String {
     words.join(" ").replace('|', "\\|")
 }
 
-/// A table of the fields of an object, without those of the envelope.
-fn table(page: &mut String, object: &Value, left_out: &[String]) {
-    page.push_str("| field | type | unit | meaning |\n|---|---|---|---|\n");
-    let required: Vec<&str> =
-        object["required"].as_array().map_or(Vec::new(), |names| names.iter().filter_map(Value::as_str).collect());
-    for (name, field) in object["properties"].as_object().unwrap_or(&Map::new()) {
-        if left_out.contains(name) {
-            continue;
-        }
-        let description = field["description"].as_str().unwrap_or_default();
-        let optional = if required.contains(&name.as_str()) { "" } else { ", *optional*" };
-        writeln!(
-            page,
-            "| `{name}` | {}{optional} | {} | {} |",
-            kind(field),
-            unit(name, description),
-            one_line(description)
-        )
-        .unwrap();
-    }
-    page.push('\n');
+/// Lines of one paragraph.
+fn lines<'l>(page: &mut String, lines: impl IntoIterator<Item = &'l String>) {
+    let lines: Vec<&str> = lines.into_iter().map(String::as_str).collect();
+    writeln!(page, "{}\n", lines.join("\\\n")).unwrap();
 }
 
-/// An object or a list of words by its name.
-pub(super) fn definition(page: &mut String, name: &str, schema: &Value) {
-    writeln!(page, "### {name}\n").unwrap();
-    if let Some(text) = schema["description"].as_str() {
-        writeln!(page, "{}\n", one_line(text)).unwrap();
-    }
-    if schema["properties"].is_object() {
-        table(page, schema, &[]);
-        return;
-    }
-    page.push_str("| value | meaning |\n|---|---|\n");
-    for choice in schema["oneOf"].as_array().into_iter().flatten() {
+/// Words with their meanings.
+pub(super) fn words(page: &mut String, schema: &Value) {
+    let line = |choice: &Value| {
         let text = one_line(choice["description"].as_str().unwrap_or_default());
-        writeln!(page, "| `{}` | {text} |", choice["const"].as_str().unwrap_or_default()).unwrap();
+        format!("`{}`: {text}", choice["const"].as_str().unwrap_or_default())
+    };
+    let choices: Vec<String> = schema["oneOf"].as_array().into_iter().flatten().map(line).collect();
+    lines(page, &choices);
+}
+
+/// The fields of an object, each as the line that the page has of it. The unit in the name is not repeated in the meaning.
+fn fields(object: &Value) -> BTreeMap<String, String> {
+    let required: Vec<&str> = object["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
+    let line = |(name, field): (&String, &Value)| {
+        let meaning = one_line(field["description"].as_str().unwrap_or_default());
+        let unit = match unit(name, "") {
+            "″" => "arcsec",
+            unit => unit,
+        };
+        let meaning = match unit {
+            "" => meaning,
+            unit => [".", ",", ":", ";", " ("]
+                .iter()
+                .fold(meaning, |text, end| text.replace(&format!(", {unit}{end}"), end)),
+        };
+        let absent = if required.contains(&name.as_str()) { "" } else { "?" };
+        // Most fields are numbers, so a number is not stated.
+        let kind = match kind(field) {
+            number if number == "number" => String::new(),
+            kind => format!(" {kind}"),
+        };
+        (name.clone(), format!("`{name}`{absent}{kind}: {meaning}"))
+    };
+    object["properties"].as_object().into_iter().flatten().map(line).collect()
+}
+
+/// An object of the page: what it has in common with others by name, then the fields that it alone has.
+struct Listing<'a> {
+    objects: &'a BTreeMap<String, BTreeMap<String, String>>,
+    common: &'a BTreeMap<String, String>,
+}
+
+impl Listing<'_> {
+    /// The largest object whose fields are all among `left`, if it has three or more.
+    fn contained(&self, name: &str, size: usize, left: &BTreeMap<String, String>) -> Option<&String> {
+        let is_part = |other: &&String| {
+            let fields = &self.objects[*other];
+            let is_smaller = (fields.len(), other.as_str()) < (size, name);
+            fields.len() >= 3 && is_smaller && fields.iter().all(|(key, line)| left.get(key) == Some(line))
+        };
+        self.objects.keys().filter(is_part).max_by_key(|other| self.objects[*other].len())
     }
-    page.push('\n');
+
+    fn write(&self, page: &mut String, name: &str, fields: BTreeMap<String, String>, order: &Value) {
+        let size = fields.len();
+        let mut left = fields;
+        let mut named: Vec<String> = Vec::new();
+        while let Some(part) = self.contained(name, size, &left) {
+            named.push(format!("[{part}](#{})", part.to_lowercase()));
+            left.retain(|key, _| !self.objects[part].contains_key(key));
+        }
+        let is_common = |key: &&String| self.common.get(*key) == left.get(*key);
+        let order: Vec<&String> = order.as_object().into_iter().flat_map(Map::keys).collect();
+        let in_common = order.iter().copied().filter(|key| left.contains_key(*key)).filter(is_common);
+        named.extend(in_common.map(|key| format!("`{key}`")));
+        if !named.is_empty() {
+            writeln!(page, "As elsewhere: {}.\n", named.join(", ")).unwrap();
+        }
+        let others = order.iter().filter(|key| !is_common(key));
+        lines(page, others.filter_map(|key| left.get(*key)));
+    }
 }
 
 fn generated() -> String {
     let schemas: Vec<Value> = COMMANDS.iter().map(|(_, subject)| schema(subject)).collect();
     let mut definitions: BTreeMap<String, Value> = BTreeMap::new();
     for schema in &schemas {
-        for (name, own) in schema["$defs"].as_object().into_iter().flatten() {
-            let known = definitions.entry(name.clone()).or_insert_with(|| own.clone());
-            assert_eq!(known, own, "two objects of the schemas are called {name}");
+        for (name, definition) in schema["$defs"].as_object().into_iter().flatten() {
+            let known = definitions.entry(name.clone()).or_insert_with(|| definition.clone());
+            assert_eq!(known, definition, "two objects of the schemas are called {name}");
         }
     }
-    // The fields before the result are those that all commands with a session have.
-    let fields =
-        |schema: &Value| -> Vec<String> { schema["properties"].as_object().unwrap().keys().cloned().collect() };
-    let shared: Vec<String> = fields(&schemas[0])
-        .into_iter()
-        .filter(|name| schemas.iter().all(|schema| fields(schema).contains(name)))
-        .filter(|name| name != "warnings")
-        .collect();
+    let objects: BTreeMap<String, BTreeMap<String, String>> =
+        definitions.iter().map(|(name, definition)| (name.clone(), fields(definition))).collect();
+    // The head: the fields that the documents of all commands have; two files have none.
+    let documents: Vec<BTreeMap<String, String>> = schemas.iter().map(fields).collect();
+    let mut head = documents[0].clone();
+    for ((_, subject), document) in COMMANDS.iter().zip(&documents) {
+        if !["model", "record"].contains(subject) {
+            head.retain(|name, line| name != "warnings" && document.get(name) == Some(line));
+        }
+    }
+    let mut counts: BTreeMap<(&String, &String), usize> = BTreeMap::new();
+    for (name, line) in documents.iter().chain(objects.values()).flatten() {
+        *counts.entry((name, line)).or_default() += 1;
+    }
+    // Of several meanings of a name the one whose repetition would take most room.
+    let mut repeated: Vec<((&String, &String), usize)> =
+        counts.into_iter().filter(|((name, _), count)| *count >= 3 && !head.contains_key(*name)).collect();
+    repeated.sort_by_key(|((_, line), count)| line.len() * count);
+    let common: BTreeMap<String, String> =
+        repeated.into_iter().map(|((name, line), _)| (name.clone(), line.clone())).collect();
     let mut page = HEAD.to_string();
     page.push_str("\n## Every document\n\n");
-    let others: Vec<String> = fields(&schemas[0]).into_iter().filter(|name| !shared.contains(name)).collect();
-    table(&mut page, &schemas[0], &others);
+    let names = schemas[0]["properties"].as_object().unwrap().keys();
+    lines(&mut page, names.filter_map(|name| head.get(name)));
+    page.push_str("## Common fields\n\n");
+    lines(&mut page, common.values());
+    let listing = Listing { objects: &objects, common: &common };
     page.push_str("## Commands\n\n");
-    for ((command, subject), schema) in COMMANDS.iter().zip(&schemas) {
+    for (((command, subject), schema), mut document) in COMMANDS.iter().zip(&schemas).zip(documents) {
         writeln!(page, "### {command}\n").unwrap();
         let text = one_line(schema["description"].as_str().unwrap_or_default());
-        writeln!(page, "{text} Schema: `abbe schema {subject}`.\n").unwrap();
-        table(&mut page, schema, &shared);
+        writeln!(page, "{text} Schema: `{subject}`.\n").unwrap();
+        document.retain(|name, line| head.get(name) != Some(line));
+        listing.write(&mut page, "", document, &schema["properties"]);
     }
     page.push_str("## Objects\n\n");
-    for (name, schema) in &definitions {
-        definition(&mut page, name, schema);
+    let keys = schema("session");
+    for (name, definition) in &definitions {
+        writeln!(page, "### {name}\n").unwrap();
+        if let Some(text) = definition["description"].as_str() {
+            writeln!(page, "{}\n", one_line(text)).unwrap();
+        }
+        if keys["$defs"].get(name) == Some(definition) {
+            writeln!(page, "Its fields are the keys of [{name}](keys.md#{name}).\n").unwrap();
+        } else if definition["properties"].is_object() {
+            listing.write(&mut page, name, objects[name].clone(), &definition["properties"]);
+        } else {
+            words(&mut page, definition);
+        }
     }
     format!("{}\n", page.trim_end())
 }

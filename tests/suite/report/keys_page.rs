@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use serde_json::Value;
 
-use crate::suite::report::json_page::{self, kept_current, kind, one_line, schema, unit};
+use crate::suite::report::json_page::{kept_current, kind, one_line, schema, unit, words};
 
 /// The files, and the subject of `abbe schema` for each.
 const FILES: [(&str, &str); 4] = [
@@ -24,7 +24,8 @@ This page lists every table of a file that is written by hand, and its keys. Exa
 machine file those of [machine](#machine). `abbe schema SUBJECT` prints the same as JSON Schema, with which an editor completes
 keys ([schemas](files.md#schemas)).
 
-A unit stands in the name of a key: `_um` µm, `_mm` mm, `_deg` °, `_arcsec` ″. A key marked *optional* may be absent.
+A unit stands in the name of a key: `_um` µm, `_mm` mm, `_deg` °, `_arcsec` ″. A key marked *optional* may be absent; `number[]` is
+an array.
 
 To write the page anew:
 
@@ -72,12 +73,12 @@ fn table(page: &mut String, object: &Value) {
 
 /// A table or a value by its name.
 fn definition(page: &mut String, name: &str, schema: &Value) {
-    if schema["oneOf"][0]["const"].is_string() {
-        return json_page::definition(page, name, schema);
-    }
     writeln!(page, "### {name}\n").unwrap();
     if let Some(text) = schema["description"].as_str() {
         writeln!(page, "{}\n", one_line(text)).unwrap();
+    }
+    if schema["oneOf"][0]["const"].is_string() {
+        return words(page, schema);
     }
     if schema["properties"].is_object() {
         table(page, schema);

@@ -7,8 +7,8 @@ use crate::paired::HeldOutDecrease;
 use crate::result::RejectedCandidate;
 use crate::state::SearchState;
 
-/// Candidates that score better than the null distribution of the search and did not lower the held-out error by more
-/// than the standard error of the fall.
+/// Candidates beyond the null distribution of the search that are rejected, because the held-out error does not
+/// decrease by more than its standard error.
 pub(super) fn candidates(
     machine: &Machine,
     search: &SearchState<'_>,

@@ -7,7 +7,7 @@ use abbe_identify::results::{Estimate, ModelResult, ParameterChange, TraceVerdic
 use abbe_identify::tolerance::Conformity;
 use abbe_model::document::print::Block;
 use abbe_model::document::test::Test;
-use abbe_model::unit::Unit;
+use abbe_model::unit::{Unit, reading};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, Serializer};
 
@@ -48,8 +48,7 @@ pub struct CurvePoint {
     pub value: f64,
     /// Standard uncertainty of `value`, in `curve_unit`.
     pub u: f64,
-    /// Whether no reading lies near this value of the driver, so that the prior determines the curve. Absent if one
-    /// does.
+    /// Whether no reading lies near this value of the driver, so that the prior determines the curve.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub extrapolated: bool,
 }
@@ -80,8 +79,7 @@ pub struct LargestOrder {
     pub order: usize,
     /// Its amplitude, in the unit of the prior's scale.
     pub amplitude: f64,
-    /// Probability that the largest of all orders is as large if none stands out: squared amplitudes are then
-    /// exponentially distributed with the mean of the other orders.
+    /// Probability that the largest of all orders is as large if none stands out.
     pub p_value: f64,
 }
 
@@ -114,12 +112,12 @@ pub struct AliasResult {
     pub delta_chi2: f64,
     /// Likelihood with the alias over likelihood with the found effect: exp(−`delta_chi2`/2).
     pub likelihood_ratio: f64,
-    /// Prior cost of the alias less that of the found effect, −ln of a probability: how much less plausible it is
-    /// mechanically, and 2 for each further number of its shape.
+    /// Prior cost of the alias less that of the found effect, −ln of a probability, and 2 for each further number of
+    /// its shape.
     pub prior_cost: f64,
     /// Probability of the alias over that of the found effect: `likelihood_ratio` · exp(−`prior_cost`).
     pub probability_ratio: f64,
-    /// Other shapes of the same component over the same driver, with the same fitted readings.
+    /// Other shapes of the same component over the same driver with the same fitted readings.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub variants: Vec<EffectName>,
 }
@@ -158,13 +156,12 @@ pub struct EffectResult {
     pub rms_gain_um: f64,
     /// Held-out rms with this effect and those found before it, µm.
     pub heldout_rms_um: f64,
-    /// Whether the effect is unique: no other effect of the library explains the readings equally well in its place.
+    /// Whether no other effect of the library explains the readings equally well in its place.
     pub unique: bool,
-    /// Other shapes of the same component over the same driver, with the same fitted readings: variants of this explanation.
+    /// Other shapes of the same component over the same driver with the same fitted readings.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub variants: Vec<EffectName>,
-    /// Number of explanations that the readings do not separate, this effect included; 1 where it is unique. Variants count
-    /// once.
+    /// Number of explanations that the readings do not separate, this one and no variants included.
     pub explanation_count: usize,
     /// All of these explanations in words, by part of the machine:
     /// `C table: axial motion twice per turn, or tilt about X once per turn`.
@@ -184,8 +181,7 @@ pub struct EffectResult {
     /// Separation of the effect from the nearest alias that this test separates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub separation: Option<SeparationResult>,
-    /// Further tests that separate the effect from its aliases. The first separates most aliases, each further test
-    /// most of the remaining ones.
+    /// Further tests that separate the effect from its aliases, the best first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub separating_tests: Vec<SeparatingTestResult>,
 }
@@ -266,9 +262,9 @@ pub struct Remainder {
 /// Effects that the declared model lacks, and the model before and after they are added.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct TraceResult {
-    /// The unit of the figures of readings, in which their keys end; absent for µm.
+    /// `arcsec` if all readings are angles: the keys of the figures of readings then end in it. Absent for µm.
     #[serde(skip_serializing_if = "Unit::is_micrometre")]
-    #[schemars(with = "String")]
+    #[schemars(schema_with = "reading::schema")]
     pub reading_unit: Unit,
     /// `clean`, `explained`, `partly-explained`, `unexplained`; `not-judged` without a known noise; `incomplete` for an
     /// interrupted trace.
@@ -292,11 +288,11 @@ pub struct TraceResult {
     pub remainder: Remainder,
     /// Structure of the residual of the declared model, in words.
     pub residual_before: String,
-    /// Candidates that score better than the null distribution of the search and that are rejected, because the
-    /// held-out error does not decrease by more than the standard error of the decrease.
+    /// Candidates beyond the null distribution of the search that are rejected, because the held-out error does not
+    /// decrease by more than its standard error.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rejected_candidates: Vec<RejectedCandidate>,
-    /// Parameters that changed by more than their standard uncertainty between `before` and `after`, which `u` is: the bias
+    /// Parameters whose estimates in `before` and `after` differ by more than the standard uncertainty in `after`: the bias
     /// by the unmodelled effects.
     pub changed_parameters: Vec<ParameterChange>,
     /// Number of candidates that were screened.

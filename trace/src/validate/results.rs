@@ -63,14 +63,13 @@ pub struct ValidationResult {
     pub model: ValidatedModel,
     /// The model without each effect.
     pub without: Vec<WithoutResult>,
-    /// Parameters that have changed, the most significant first. Where the residual of all readings is not as predicted,
-    /// from the readings inside the range. Empty if `not_judged` is present.
+    /// Parameters that have changed, the most significant first; empty if `not_judged` is present.
     pub moved: Vec<MovedParameter>,
-    /// Why no parameter is said to have moved: the model itself lacks an effect. Absent if changes are judged.
+    /// Why no parameter is said to have moved: the model itself lacks an effect.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_judged: Option<ModelNotJudged>,
-    /// The volumetric error of the model and of the model with what has moved, rms in µm over the range of its axes; empty
-    /// if nothing has moved or the axes have no range.
+    /// The volumetric error of the model, and with what has moved, rms in µm over its axes' range; empty if nothing has
+    /// moved.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub volumetric_rms_um: Vec<f64>,
     /// The estimated set-up of the session.
@@ -100,8 +99,7 @@ pub struct RmsResult {
     /// Length of the residual vector, µm, for instruments with three coordinates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_3d_um: Option<f64>,
-    /// `√(χ²/ν)` of the residual over the noise and of the set-up over its priors; 1 if noise alone remains. It also
-    /// shows errors of the machine that the set-up absorbs.
+    /// `√(χ²/ν)` of the residual and of the set-up over its priors; 1 if noise alone remains.
     pub noise_ratio: f64,
 }
 
@@ -131,7 +129,7 @@ pub struct ValidatedModel {
     /// All readings.
     #[serde(flatten)]
     pub residual: JudgedResidual,
-    /// The readings inside the range of the model's data, with the set-up that they give; absent if all or none are inside.
+    /// The readings inside the range of the model's data; absent if all or none are inside.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub in_range: Option<JudgedResidual>,
 }

@@ -33,13 +33,13 @@ fn session(folder: &Path, radius_mm: f64, motion: &str) -> PathBuf {
     plan
 }
 
-/// Rows of C in degrees, the nest in mm, and deviations in mm: 5 µm upwards, and 20 µm across that the table turns with, or
-/// turns away under a tool that stands.
+/// Rows of C in degrees, the nest in mm, and deviations in mm: 5 µm upwards, and 20 µm across, under which the table with its
+/// sensors turns away.
 fn rows(radius_mm: f64) -> impl Iterator<Item = [f64; 7]> {
     (0..=36).map(move |k| {
         let c = f64::from(k) * 10.0;
         let (sin, cos) = c.to_radians().sin_cos();
-        [c, radius_mm * cos, radius_mm * sin, 60.0, 0.02 * cos, if radius_mm > 0.0 { 0.02 } else { -0.02 } * sin, 0.005]
+        [c, radius_mm * cos, radius_mm * sin, 60.0, 0.02 * cos, -0.02 * sin, 0.005]
     })
 }
 
