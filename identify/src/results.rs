@@ -89,7 +89,7 @@ pub struct ModelResult {
     /// Held-out errors by what is held out.
     #[serde(flatten)]
     pub cross_validation: CrossValidation,
-    /// Numerical rank: number of independent combinations of the parameters that are identifiable.
+    /// Number of independent combinations of the parameters that are identifiable.
     pub rank: usize,
     /// Number of parameters, set-up parameters included.
     pub parameter_count: usize,

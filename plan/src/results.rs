@@ -16,7 +16,7 @@ pub struct PlanAnalysis {
     pub noise: ReadingNoise,
     /// Number of readings.
     pub readings: usize,
-    /// Numerical rank: number of independent combinations of the parameters that are identifiable.
+    /// Number of independent combinations of the parameters that are identifiable.
     pub rank: usize,
     /// Number of parameters, set-up parameters included.
     pub parameter_count: usize,

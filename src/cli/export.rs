@@ -6,8 +6,7 @@ use std::path::PathBuf;
 
 use abbe::apply::export::kinematics::ENTRIES;
 use abbe::exports::{self, Contents};
-use abbe::files;
-use abbe::files::robot::dh::Convention;
+use abbe::files::{self, robot::dh::Convention};
 use abbe::identify::model_file;
 use abbe::model::Diagnostic;
 use clap::Args;
@@ -85,8 +84,7 @@ pub struct ExportArguments {
     /// Example: --as heidenhain-tables --places 73
     #[arg(long, value_name = "N")]
     places: Option<usize>,
-    /// Position of an axis, mm or degrees, at which the entries of a table are 0 [default: the errors of the model; 0 at
-    /// the first entry if the table does not contain the position 0].
+    /// Position of an axis, mm or degrees, at which entries are 0 [default: the first of a table without position 0].
     ///
     /// Example: --as linuxcnc-tables --reference X=-400
     #[arg(long, value_name = "AXIS=POSITION", allow_hyphen_values = true)]

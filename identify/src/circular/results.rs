@@ -14,7 +14,7 @@ pub struct CircularTest {
     /// The axes of the path: `XY` for a circle of two linear axes, `C` for a rotary axis.
     pub axes: String,
     /// Name in ISO 10791-6 of the synchronous motion of a rotary axis of a table and two linear axes: `BK1` for A or B,
-    /// `BK2` for C, if both rotary axes are on the table. Absent for every other path.
+    /// `BK2` for C, if both rotary axes are on the table.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub iso_10791_6: Option<String>,
     /// Direction of the bar in a synchronous motion: `radial`, `tangential`, `axial`. Absent for every other path.

@@ -96,7 +96,7 @@ impl std::fmt::Display for NoiseSource {
 /// The noise of one scalar reading, as JSON has it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ReadingNoise {
-    /// `arcsec` if all readings are angles: the keys of the figures of readings then end in it. Absent for µm.
+    /// `arcsec` if all readings are angles, in which the keys of figures then end; absent for µm.
     #[serde(rename = "reading_unit", default, skip_serializing_if = "Unit::is_micrometre")]
     #[serde(deserialize_with = "reading::deserialize")]
     #[schemars(schema_with = "reading::schema")]

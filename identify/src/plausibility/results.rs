@@ -9,7 +9,7 @@ pub struct Plausibility {
     /// Statements of the session that the readings contradict, the worst first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub conflicts: Vec<Conflict>,
-    /// Mistakes that remove the conflicts, the most probable first. The readings do not separate them.
+    /// Mistakes that remove the conflicts, the most probable first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub suggestions: Vec<Suggestion>,
     /// For poses: share of the variance of the measured positions that the model explains.

@@ -154,9 +154,9 @@ pub struct MeasuredValue {
 pub struct ParameterChange {
     /// Identifier.
     pub id: String,
-    /// Its change, in `unit`: the value in the other input less that in the first, now less in the model, after less before.
+    /// Its change, in `unit`: the other input less the first, now less the model, after less before.
     pub value: f64,
-    /// Standard uncertainty of the change, in `unit`; of `changed_parameters` that of the estimate in `after`.
+    /// Its standard uncertainty, in `unit`; of `changed_parameters` that of `after`.
     pub u: f64,
     /// Unit of `value` and `u`.
     pub unit: String,

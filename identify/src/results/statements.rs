@@ -149,8 +149,7 @@ pub struct Statements<G = GoodStatement, C = AxisCorrection> {
     /// What has changed, which is no error that remains; of a history steps that are explained.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub changed: Vec<C>,
-    /// What else exceeds its expanded uncertainty: effects, and errors that move no axis line, without set-up
-    /// parameters.
+    /// What else exceeds its expanded uncertainty: effects, and errors that move no axis line.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub further: Vec<Estimate>,
     /// What to measure next.

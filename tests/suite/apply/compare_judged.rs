@@ -111,7 +111,10 @@ fn a_model_that_lacks_an_effect_says_nothing_of_what_moved() {
     assert_eq!((&found["moved"], &found["statements"]["measure"]["step"]), (&serde_json::json!([]), &"trace".into()));
     assert_eq!(found["not_judged"]["session"], text(&after));
     assert!(found["not_judged"]["birge_ratio"].as_f64().unwrap() > 1.0 && found["statements"]["changed"].is_null());
-    assert!(screen.contains("What has changed: not judged; the model (") && !screen.contains("moved by"), "{screen}");
+    assert!(
+        screen.contains("What has changed: not judged, because of the model (") && !screen.contains("moved by"),
+        "{screen}"
+    );
     let command = ["trace", text(&after), "--save", text(&traced)];
     assert!(screen.contains(&format!("abbe {}", command.join(" "))), "{screen}");
     succeeds(&command);

@@ -35,30 +35,28 @@ const COMMANDS: [(&str, &str); 22] = [
 
 const HEAD: &str = "# JSON results
 
-*Reader: the engineer whose program reads the results, and the researcher who archives them. This page is
-generated from the schemas by a test.*
+*Reader: the engineer whose program reads the results, and the researcher who archives them. A test generates this page from
+the schemas.*
 
-Every command that has `--json FILE` writes one JSON document. Example:
+`--json FILE` of a command writes one document:
 
 ```console
 abbe fit sessions/hermle-c600u/measured/session.toml --quiet --json - | jq '.parameters[] | {id, value, u, unit}'
 ```
 
-`abbe schema SUBJECT` prints the JSON Schema (draft 2020-12) of each document. A document has the fields of its schema and no
-others. To write the page anew:
+`abbe schema SUBJECT` prints its JSON Schema (draft 2020-12). A document has the fields of its schema and no others. This writes
+the page anew:
 
 ```console
 ABBE_UPDATE_PAGES=1 cargo test --profile checked -p abbe --test main json_page
 ```
 
-A unit stands in the name of a field (`_um` µm, `_mm` mm, `_deg` °, `_min` min, `_sigma` standard deviations of the noise) or in a
-field `unit` beside it (`um`, `arcsec`, `deg`, `um/K`, …). `u` is a standard uncertainty, `expanded_u` is 2 `u`. Numbers that do not
-exist are `null`. A field without a type is a number, `number[]` is an array, `number?` may be `null`; a field with `?` after its
-name is absent where it does not apply.
-What several objects have in common stands once: an object lists the names of [common fields](#common-fields) that it has, and
-names another object whose fields it has too.
+A unit stands in the name of a field (`_um` µm, `_mm` mm, `_deg` °, `_min` min, `_sigma` standard deviations of the noise) or in
+`unit` beside it. `u` is a standard uncertainty, `expanded_u` is 2 `u`. A field without a type is a number. `[]` marks an array, `?`
+behind a type what may be `null` (a number that does not exist), `?` behind a name what may be absent. *As elsewhere* names [common
+fields](#common-fields), and objects all of whose fields an object has.
 
-`schema_version` is 3. It increases when a field changes its name or its meaning, or is removed; new fields leave it unchanged.
+`schema_version` is 3. It increases when a field changes its name or its meaning, or is removed.
 ";
 
 pub(super) fn schema(subject: &str) -> Value {

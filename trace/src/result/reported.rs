@@ -23,7 +23,7 @@ pub struct EffectName {
     /// Order of a harmonic (periods per turn), degree of a polynomial. An integer unless the session states a fraction.
     #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "whole_as_integer")]
     pub order: Option<f64>,
-    /// The tests to which the effect is confined; absent for all tests.
+    /// The tests to which the effect is confined, if any.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tests: Vec<String>,
     /// What the effect is, in words: `C table: axial motion twice per turn`.
@@ -262,7 +262,7 @@ pub struct Remainder {
 /// Effects that the declared model lacks, and the model before and after they are added.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct TraceResult {
-    /// `arcsec` if all readings are angles: the keys of the figures of readings then end in it. Absent for µm.
+    /// `arcsec` if all readings are angles, in which the keys of figures then end; absent for µm.
     #[serde(skip_serializing_if = "Unit::is_micrometre")]
     #[schemars(schema_with = "reading::schema")]
     pub reading_unit: Unit,
