@@ -47,7 +47,7 @@ pub struct Candidates {
 /// The options of a search.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "command", derive(clap::Args))]
-#[serde(default)]
+#[serde(from = "Named")]
 pub struct SearchOptions {
     /// Which effects.
     #[cfg_attr(feature = "command", command(flatten))]
@@ -65,6 +65,25 @@ pub struct SearchOptions {
     /// Seconds after which the search ends with the effects found so far. A time beyond what a clock can hold is no limit.
     #[cfg_attr(feature = "command", arg(skip))]
     pub time_limit: Option<f64>,
+}
+
+/// The options by their names. A struct within another one would not refuse a name that it does not know.
+#[derive(Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Named {
+    max_effects: Option<usize>,
+    only: Vec<String>,
+    exclude: Vec<String>,
+    assume: Vec<String>,
+    allow_implausible: bool,
+    time_limit: Option<f64>,
+}
+
+impl From<Named> for SearchOptions {
+    fn from(named: Named) -> SearchOptions {
+        let Named { max_effects, only, exclude, assume, allow_implausible, time_limit } = named;
+        SearchOptions { candidates: Candidates { max_effects, only, exclude }, assume, allow_implausible, time_limit }
+    }
 }
 
 impl SearchOptions {

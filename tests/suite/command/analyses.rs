@@ -36,7 +36,7 @@ fn what_cannot_be_analysed_is_refused_with_its_name() {
         ("plan", r#"{"noise": 1}"#, "an option of `plan` cannot be used: unknown field `noise`"),
         ("plan", r#"{"noise_um": 0}"#, "`noise_um` is 0; a number of µm from 1e-6 to 1e12 is expected"),
         ("trace", r#"{"time_limit": -1}"#, "`time_limit` is -1"),
-        ("trace", r#"{"max_effect": 1}"#, "`trace` has no option `max_effect`"),
+        ("trace", r#"{"max_effect": 1}"#, "an option of `trace` cannot be used: unknown field `max_effect`"),
         ("validate", "{}", "a model and a session are expected"),
         ("compare", r#"{"names": ["a"]}"#, "at least two inputs, each with its name, are expected"),
     ] {
