@@ -107,7 +107,7 @@ fn deviations_in_thousandths_of_an_inch_are_named() {
     under_um(&mut session, 0.0254);
     let (found, screen) = result_and_screen("fit", &written(folder.path(), &session), &[]);
     nothing_passes(&found, &screen, "wrong-unit");
-    let unit = "probably inches under mm, or thousandths of an inch under µm";
+    let unit = "possibly inches in a column named mm, or thousandths of an inch in one named µm";
     assert!(screen.contains(&format!("the unit of the readings is checked: {unit}")), "{screen}");
 }
 
