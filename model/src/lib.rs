@@ -9,7 +9,7 @@
 //! - [`sensitivity`]: readings and their derivatives by every component; [`replay`]: evaluation over columns of
 //!   readings;
 //! - [`session`]: machine, tests and readings; [`document`]: the keys of their files;
-//! - [`median`]: the median; [`words`]: counts in messages; [`calendar`]: dates and times of day in texts; [`unit`]: units.
+//! - [`median`]: the median; [`words`]: counts in messages; [`calendar`]: dates and times of day in texts; [`mod@unit`]: units.
 //!
 //! The chain over plain and dual numbers: the reading of a ball bar, and its derivative by a location error of C,
 //! ∂L/∂EX0C = −R·sin C/L₀.

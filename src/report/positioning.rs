@@ -2,8 +2,7 @@
 
 use abbe::identify::figure::{Figure, OF_DIAGONALS, POSITIONING, find};
 use abbe::identify::positioning::diagonal::{DiagonalKind, DiagonalTest, LargestOfDiagonals};
-use abbe::identify::positioning::uncertainty::COVERAGE;
-use abbe::identify::positioning::{Approach, Contributions, Deviations, Position, PositioningTest};
+use abbe::identify::positioning::{Approach, COVERAGE, Contributions, Deviations, Position, PositioningTest};
 
 use super::block::{Report, Text};
 use super::figure::lines::{Axis, Lines, Mark, Series};

@@ -3,7 +3,7 @@
 
 pub mod diagonal;
 mod figures;
-pub mod uncertainty;
+mod uncertainty;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
@@ -14,7 +14,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 pub use self::figures::{Approach, Position};
-pub use self::uncertainty::Contributions;
+pub use self::uncertainty::{COVERAGE, Contributions};
 use crate::figure::Figure;
 use crate::numerics::range;
 
