@@ -347,7 +347,7 @@ mod tests {
     fn parts_of_effects_of_every_shape_are_read_as_what_they_are() {
         let all = shapes();
         for entry in SHAPES {
-            assert!(all.iter().any(|shape| shape.word() == entry.word), "{}", entry.word);
+            assert!(all.iter().any(|shape| shape.entry().word == entry.word), "{}", entry.word);
         }
         let tests: [&[&str]; 3] = [&[], &["A.cos", "B#2"], &["x[1].phase"]];
         let components = ["EZC", "spindle_ball.y", "trigger"];
