@@ -70,7 +70,10 @@ impl DriverKind for Gravity<'_> {
         if axis == Some(AxisKind::Rotary) {
             return Ok(());
         }
-        Err(Diagnostic::session(format!("gravity exerts no moment about \"{component}\""), "gravity acts on the errors of rotary axes, by a moment about the axis"))
+        Err(Diagnostic::session(
+            format!("gravity exerts no moment about \"{component}\""),
+            "gravity acts on the errors of rotary axes, by a moment about the axis",
+        ))
     }
 }
 

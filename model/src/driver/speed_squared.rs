@@ -59,7 +59,10 @@ impl DriverKind for SpeedSquared {
         if axis.is_some() {
             return Ok(());
         }
-        Err(Diagnostic::session(format!("\"{component}\" belongs to no axis, so it has no speed"), "the driver is the speed of the component's own axis; name an error of an axis"))
+        Err(Diagnostic::session(
+            format!("\"{component}\" belongs to no axis, so it has no speed"),
+            "the driver is the speed of the component's own axis; name an error of an axis",
+        ))
     }
 }
 

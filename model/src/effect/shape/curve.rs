@@ -87,10 +87,7 @@ impl ShapeKind for Curve {
         positive(self.to - self.from, "the length of a curve")?;
         let least = if self.closed { 4 } else { 1 };
         if self.intervals < least || self.intervals > MAX_INTERVALS {
-            return Err(format!(
-                "a curve has {} intervals; {least} to {MAX_INTERVALS} are allowed",
-                self.intervals
-            ));
+            return Err(format!("a curve has {} intervals; {least} to {MAX_INTERVALS} are allowed", self.intervals));
         }
         Ok(())
     }

@@ -51,9 +51,7 @@ pub(super) fn write(degree: usize, scale: f64, keys: &mut KeyWriter) {
 pub(super) fn check(degree: usize, scale: f64) -> Result<(), String> {
     positive(degree as f64, "the degree of a polynomial")?;
     if degree > HIGHEST_DEGREE {
-        return Err(format!(
-            "a polynomial of degree {degree} cannot be fitted; the limit is {HIGHEST_DEGREE}"
-        ));
+        return Err(format!("a polynomial of degree {degree} cannot be fitted; the limit is {HIGHEST_DEGREE}"));
     }
     positive(scale, "the scale of a polynomial")
 }
