@@ -331,6 +331,14 @@ fn set_ups(problem: &Problem, pulls: &Pulls) -> Vec<Conflict> {
     }]
 }
 
+/// What the nominal machine leaves of the spread (mm²) of poses where the iterations start: with the set-up that is found before
+/// them. A fit of the set-up leaves no more.
+fn share_at_start(problem: &Problem, spread_mm2: f64) -> f64 {
+    let start = problem.residuals(&vec![0.0; problem.parameters.list.len()]);
+    let [lengths_mm, angles_mm] = rms_by_unit_mm(problem, &start).map(|rms| rms.unwrap_or(0.0));
+    (lengths_mm / spread_mm2.sqrt()).hypot(angles_mm / problem.session.lever_mm)
+}
+
 /// Poses: what the model explains of the spread of the measured positions.
 fn of_poses(problem: &Problem, fit: &Fit) -> Plausibility {
     let channels = problem.channels(0) as f64;
@@ -346,7 +354,8 @@ fn of_poses(problem: &Problem, fit: &Fit) -> Plausibility {
     let is_contradicted = explained < WELL_EXPLAINED || turned.is_some() || !locations.is_empty();
     // Links of another shape may explain all, as where every joint has the opposite sign.
     let is_far = |left: &poses::Left| left.share > FAR_FROM_NOMINAL;
-    let nominal = if is_contradicted { None } else { poses::left_by_nominal(problem).filter(is_far) };
+    let is_tried = !is_contradicted && share_at_start(problem, spread) > FAR_FROM_NOMINAL;
+    let nominal = if is_tried { poses::left_by_nominal(problem).filter(is_far) } else { None };
     let is_searched = is_contradicted || nominal.is_some();
     let suggestions = if is_searched { poses::suggestions(problem) } else { Vec::new() };
     let little = explained < MIN_EXPLAINED;
