@@ -149,11 +149,13 @@ fn plans(folder: &Path) -> Vec<PathBuf> {
     PLANS.iter().map(|plan| sessions.join(plan)).chain([circles(folder)]).collect()
 }
 
-/// What LinuxCNC's interpreter prints.
+/// What LinuxCNC's interpreter prints. Its tool table is the file `.tool.mmap` of the home folder, which each start
+/// empties: two that run at the same time with one home folder end with a bus error.
 fn rs274(program: &Path, folder: &Path, file: &str) -> String {
     let mut yes = Command::new("yes").stdout(Stdio::piped()).spawn().unwrap();
     let input = yes.stdout.take().unwrap();
-    let output = Command::new(program).args(["-g", file]).current_dir(folder).stdin(input).output().unwrap();
+    let output =
+        Command::new(program).args(["-g", file]).current_dir(folder).env("HOME", folder).stdin(input).output().unwrap();
     yes.kill().unwrap();
     yes.wait().unwrap();
     let messages = String::from_utf8_lossy(&output.stderr);
