@@ -5,7 +5,7 @@ use std::fmt::Write;
 use abbe_model::axis::AxisKind;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-use super::chain::Chain;
+use super::chain::{Chain, Joint};
 
 /// How the robot is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -109,6 +109,15 @@ fn held(chain: &Chain, joint: usize) -> f64 {
     within(wanted, joint_of.travel)
 }
 
+/// The position at which a test holds a joint, deg or mm: three places where they lie within its travel.
+fn held_to_display(chain: &Chain, joint: usize) -> f64 {
+    let Joint { kind, travel, .. } = chain.joints[joint];
+    let position = kind.to_display(held(chain, joint));
+    let (lower, upper) = travel.map_or((f64::MIN, f64::MAX), |ends| ends.map(|end| kind.to_display(end)).into());
+    let places = [position * 1e3, position * 1e3 - 0.5, position * 1e3 + 0.5].map(|near| near.round() / 1e3);
+    places.into_iter().find(|near| (lower..=upper).contains(near)).unwrap_or(position)
+}
+
 fn within(position: f64, travel: Option<[f64; 2]>) -> f64 {
     travel.map_or(position, |[lower, upper]| position.clamp(lower, upper))
 }
@@ -169,10 +178,9 @@ fn tracker(chain: &Chain, point: &str, target_mm: [f64; 3], columns: &[String]) 
         let whole = [ends[0].ceil(), ends[1].floor()];
         let [from, to] = if whole[1] - whole[0] >= LEAST_WHOLE { whole } else { ends };
         let step = (to - from) / STEPS;
-        let others = (0..chain.joints.len()).filter(|other| *other != number).map(|other| {
-            let position = chain.joints[other].kind.to_display(held(chain, other));
-            format!("{} = {}", columns[other], (position * 1e3).trunc() / 1e3)
-        });
+        let others = (0..chain.joints.len())
+            .filter(|other| *other != number)
+            .map(|other| format!("{} = {}", columns[other], self::number(held_to_display(chain, other))));
         let _ = write!(
             text,
             "\n[[test]]\nname = \"{name}\"\n# The target in the tool frame, which lies in the frame of the base with all joints at zero.\n\

@@ -21,6 +21,8 @@ use crate::spelling::suggestion;
 
 /// Largest length in a file, m: a kilometre.
 const MAX_M: f64 = 1e3;
+/// Limit that says that there is none, rad or m.
+const NO_LIMIT: f64 = 1e5;
 /// Number of links that a message names.
 const NAMED: usize = 20;
 /// Links that makers call the end of the arm, the first of them first.
@@ -66,13 +68,15 @@ impl UrdfJoint {
 }
 
 /// A URDF file.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Urdf {
     name: String,
     links: Vec<String>,
     joints: Vec<UrdfJoint>,
     /// The joint before each link, by the name of the link.
     before: HashMap<String, usize>,
+    /// The line and the name of an element of xacro beside links and joints.
+    xacro: Option<(usize, String)>,
 }
 
 /// Reads a URDF file.
@@ -80,94 +84,115 @@ pub struct Urdf {
 /// # Errors
 /// If it is no URDF, or its links form no tree, with the line and what to do.
 pub fn read(source: &Source) -> Result<Urdf, Diagnostic> {
-    let text = &source.text;
-    // The bytes at which lines end, so that the line of a byte is found by bisection.
-    let ends: Vec<usize> =
-        text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(place, _)| place).collect();
-    let line_of = |byte: usize| 1 + ends.partition_point(|end| *end < byte);
-    let fault = |byte: usize, message: String, help: &str| {
-        Diagnostic::input(Location::line(&source.file, line_of(byte)), message, help)
-    };
-    if let Some(byte) = text.find("<xacro:") {
-        let help = "write the URDF that it describes: `xacro FILE.xacro > robot.urdf`";
-        return Err(fault(byte, "this is a xacro file, a program that writes a URDF".into(), help));
+    let mut urdf = Urdf::default();
+    let outcome = urdf.read(source);
+    match (&urdf.xacro, outcome) {
+        // Links and joints that the program would write are missing.
+        (Some((line, _)), outcome) if outcome.is_err() || !urdf.joints.iter().any(UrdfJoint::moves) => {
+            Err(Diagnostic::input(
+                Location::line(&source.file, *line),
+                "this is a xacro file, a program that writes a URDF",
+                "write the URDF that it describes: `xacro FILE.xacro > robot.urdf`",
+            ))
+        }
+        (_, outcome) => outcome.map(|()| urdf),
     }
-    let mut urdf = Urdf { name: String::new(), links: Vec::new(), joints: Vec::new(), before: HashMap::new() };
-    let mut reader = Reader::from_str(text);
-    let mut path: Vec<(String, usize)> = Vec::new();
-    loop {
-        let before = reader.buffer_position() as usize;
-        let event = reader
-            .read_event()
-            .map_err(|cause| fault(before, format!("not valid XML: {cause}"), "check that the file is a URDF"))?;
-        let after = reader.buffer_position() as usize;
-        let (element, is_empty) = match event {
-            Event::Start(element) => (element, false),
-            Event::Empty(element) => (element, true),
-            Event::End(_) => {
-                path.pop();
-                continue;
-            }
-            Event::Eof => match path.last() {
-                None => break,
-                Some((open, start)) => {
-                    let message = format!("the file ends within <{open}>, which begins on line {}", line_of(*start));
-                    return Err(fault(text.len(), message, "the file is cut off: get it whole"));
-                }
-            },
-            _ => continue,
+}
+
+impl Urdf {
+    /// Reads a file into an empty one.
+    fn read(&mut self, source: &Source) -> Result<(), Diagnostic> {
+        let text = &source.text;
+        // The bytes at which lines end, so that the line of a byte is found by bisection.
+        let ends: Vec<usize> =
+            text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(place, _)| place).collect();
+        let line_of = |byte: usize| 1 + ends.partition_point(|end| *end < byte);
+        let fault = |byte: usize, message: String, help: &str| {
+            Diagnostic::input(Location::line(&source.file, line_of(byte)), message, help)
         };
-        let name = element.name().as_ref().to_string();
-        let whole = |message: String| fault(before, message, "correct the file");
-        let text_of = |key: &str| attribute(&element, key);
-        // What lies deeper is not looked at.
-        let above: Vec<&str> = path.iter().take(3).map(|(name, _)| name.as_str()).collect();
-        match (above.as_slice(), name.as_str()) {
-            ([], "robot") => urdf.name = text_of("name").map_err(whole)?.unwrap_or_default(),
-            ([], _) => {
-                return Err(fault(before, format!("the first element is <{name}>, not <robot>"), "name a URDF file"));
-            }
-            (["robot"], "link") => urdf.links.extend(text_of("name").map_err(whole)?),
-            (["robot"], "joint") => {
-                let word = text_of("type").map_err(whole)?.unwrap_or_default();
-                let kind = match word.as_str() {
-                    "revolute" | "continuous" => Kind::Rotary,
-                    "prismatic" => Kind::Linear,
-                    "fixed" => Kind::Fixed,
-                    _ => Kind::Other,
-                };
-                urdf.joints.push(UrdfJoint {
-                    name: text_of("name").map_err(whole)?.unwrap_or_default(),
-                    kind,
-                    word,
-                    parent: String::new(),
-                    child: String::new(),
-                    origin: Isometry3::identity(),
-                    axis: Vector3::x(),
-                    limits: None,
-                    mimics: false,
-                    origin_bytes: None,
-                    after_start: after,
-                    line: line_of(before),
-                });
-            }
-            (["robot", "joint"], _) => {
-                if let Some(joint) = urdf.joints.last_mut() {
-                    part_of_joint(joint, &name, &text_of, before..after).map_err(whole)?;
+        let mut reader = Reader::from_str(text);
+        let mut path: Vec<(String, usize)> = Vec::new();
+        loop {
+            let before = reader.buffer_position() as usize;
+            let event = reader
+                .read_event()
+                .map_err(|cause| fault(before, format!("not valid XML: {cause}"), "check that the file is a URDF"))?;
+            let after = reader.buffer_position() as usize;
+            let (element, is_empty) = match event {
+                Event::Start(element) => (element, false),
+                Event::Empty(element) => (element, true),
+                Event::End(_) => {
+                    path.pop();
+                    continue;
                 }
+                Event::Eof => match path.last() {
+                    None => break,
+                    Some((open, start)) => {
+                        let message =
+                            format!("the file ends within <{open}>, which begins on line {}", line_of(*start));
+                        return Err(fault(text.len(), message, "the file is cut off: get it whole"));
+                    }
+                },
+                _ => continue,
+            };
+            let name = element.name().as_ref().to_string();
+            let whole = |message: String| fault(before, message, "correct the file");
+            let text_of = |key: &str| attribute(&element, key);
+            // What lies deeper is not looked at.
+            let above: Vec<&str> = path.iter().take(3).map(|(name, _)| name.as_str()).collect();
+            match (above.as_slice(), name.as_str()) {
+                ([], "robot") => self.name = text_of("name").map_err(whole)?.unwrap_or_default(),
+                ([], _) => {
+                    return Err(fault(
+                        before,
+                        format!("the first element is <{name}>, not <robot>"),
+                        "name a URDF file",
+                    ));
+                }
+                (["robot"], _) if name.starts_with("xacro:") => {
+                    self.xacro.get_or_insert((line_of(before), name.clone()));
+                }
+                (["robot"], "link") => self.links.extend(text_of("name").map_err(whole)?),
+                (["robot"], "joint") => {
+                    let word = text_of("type").map_err(whole)?.unwrap_or_default();
+                    let kind = match word.as_str() {
+                        "revolute" | "continuous" => Kind::Rotary,
+                        "prismatic" => Kind::Linear,
+                        "fixed" => Kind::Fixed,
+                        _ => Kind::Other,
+                    };
+                    self.joints.push(UrdfJoint {
+                        name: text_of("name").map_err(whole)?.unwrap_or_default(),
+                        kind,
+                        word,
+                        parent: String::new(),
+                        child: String::new(),
+                        origin: Isometry3::identity(),
+                        axis: Vector3::x(),
+                        limits: None,
+                        mimics: false,
+                        origin_bytes: None,
+                        after_start: after,
+                        line: line_of(before),
+                    });
+                }
+                (["robot", "joint"], _) => {
+                    if let Some(joint) = self.joints.last_mut() {
+                        part_of_joint(joint, &name, &text_of, before..after).map_err(whole)?;
+                    }
+                }
+                _ => {}
             }
-            _ => {}
+            if !is_empty {
+                path.push((name, before));
+            }
         }
-        if !is_empty {
-            path.push((name, before));
+        if self.name.is_empty() && self.joints.is_empty() {
+            return Err(fault(0, "no element <robot>".into(), "name a URDF file"));
         }
+        self.connect()
+            .map_err(|(line, message, help)| Diagnostic::input(Location::line(&source.file, line), message, help))
     }
-    if urdf.name.is_empty() && urdf.joints.is_empty() {
-        return Err(fault(0, "no element <robot>".into(), "name a URDF file"));
-    }
-    urdf.connect()
-        .map_err(|(line, message, help)| Diagnostic::input(Location::line(&source.file, line), message, help))?;
-    Ok(urdf)
 }
 
 /// An element of a joint; the error is a message.
@@ -191,8 +216,13 @@ fn part_of_joint(
             joint.origin_bytes = Some(bytes);
         }
         "axis" => {
-            let axis = Vector3::from(numbers("xyz", [1.0, 0.0, 0.0])?);
-            joint.axis = axis.try_normalize(1e-9).ok_or("the axis of the joint has no direction")?;
+            let axis = Vector3::from(numbers("xyz", [1.0, 0.0, 0.0])?).try_normalize(1e-9);
+            // A joint that does not move has no use for a direction.
+            joint.axis = match axis {
+                Some(axis) => axis,
+                None if joint.moves() => return Err("the axis of the joint has no direction".into()),
+                None => joint.axis,
+            };
         }
         "limit" => {
             for (place, key) in ["lower", "upper"].into_iter().enumerate() {
@@ -377,13 +407,28 @@ impl Urdf {
             return Err(("the file has no movable joint".into(), "name the URDF of a robot".into()));
         }
         let last: Vec<&str> = leaves.into_iter().filter(|leaf| moving(leaf) == most).collect();
+        // Fingers and frames behind the flange: the arm ends where it forks, if most of its joints lie before.
+        let fork = self.fork(&last);
         match last[..] {
             [end] => Ok(end.to_string()),
+            _ if 2 * moving(&fork) > most => Ok(fork),
             _ => Err((
                 format!("the arm may end at {}", first_of(&last, NAMED, ", ", "link")),
                 "state the link of the flange: its name is the tip of the chain".into(),
             )),
         }
+    }
+
+    /// The last link before all of these.
+    fn fork(&self, links: &[&str]) -> String {
+        let way = |end: &str| -> Vec<&str> {
+            let before = |link: &&str| self.joint_before(link).map(|joint| joint.parent.as_str());
+            let start = self.joints.iter().find(|joint| joint.child == end).map(|joint| joint.child.as_str());
+            std::iter::successors(start, before).collect()
+        };
+        let ways: Vec<HashSet<&str>> = links.iter().map(|link| way(link).into_iter().collect()).collect();
+        let first = links.first().map_or_else(Vec::new, |link| way(link));
+        first.into_iter().find(|link| ways.iter().all(|way| way.contains(link))).unwrap_or_default().to_string()
     }
 
     /// The chain to a link.
@@ -394,6 +439,12 @@ impl Urdf {
         let (path, flange) = self.path(file, tip)?;
         let mut frame = Isometry3::identity();
         let (mut joints, mut assumed) = (Vec::new(), Vec::new());
+        if tip.is_none() && self.joints.iter().filter(|joint| joint.parent == flange).count() > 1 {
+            assumed.push(format!("the arm ends at link `{flange}`, where it forks"));
+        }
+        if let Some((line, name)) = &self.xacro {
+            assumed.push(format!("<{name}> on line {line} is a program of xacro and was not run"));
+        }
         for joint in &path {
             frame *= joint.origin;
             let kind = match joint.kind {
@@ -403,14 +454,14 @@ impl Urdf {
             };
             let scale = if kind == AxisKind::Linear { Unit::Metre.internal() } else { 1.0 };
             let is_endless = joint.word == "continuous";
-            let travel = joint
-                .limits
-                .filter(|[lower, upper]| !is_endless && lower < upper && lower.is_finite() && upper.is_finite());
+            let is_far = |limit: &f64| limit.abs() >= NO_LIMIT;
+            let travel = joint.limits.filter(|ends| !is_endless && ends[0] < ends[1] && !ends.iter().any(is_far));
             // What a file states and the machine does not have is named.
             let why = match joint.limits {
                 Some([0.0, 0.0]) if is_endless => None,
                 Some(_) if is_endless => Some("is continuous, and its limits are not used"),
                 None if !is_endless => Some("states no limits"),
+                Some(ends) if ends.iter().any(is_far) => Some("states limits that no joint reaches"),
                 Some(_) if travel.is_none() => Some("states limits between which it cannot move"),
                 _ => None,
             };

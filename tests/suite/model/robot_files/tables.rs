@@ -155,3 +155,54 @@ fn a_joint_that_hardly_moves_has_a_plan() {
         success(&abbe(&["plan", text(&folder.join("plan.toml")), "--no-effects", "--quiet"]));
     }
 }
+
+/// What URDF files of makers contain and other programs load: an axis of length zero of a joint that does not move, the
+/// word xacro, limits that no joint reaches, limits that rounding passes, fingers behind the flange, and a call of xacro.
+#[test]
+fn what_other_programs_load_is_loaded() {
+    let place = tempfile::tempdir().unwrap();
+    let load = |number: usize, joints: &str| {
+        let mut links: Vec<&str> =
+            joints.split("link=\"").skip(1).map(|rest| rest.split('"').next().unwrap()).collect();
+        links.sort_unstable();
+        links.dedup();
+        let links: String = links.iter().map(|link| format!("<link name=\"{link}\"/>")).collect();
+        let file = place.path().join(format!("{number}.urdf"));
+        std::fs::write(&file, format!("<robot name=\"r\">{links}{joints}</robot>")).unwrap();
+        let folder = place.path().join(format!("r{number}"));
+        let output = abbe(&["new", text(&folder), "--from-urdf", text(&file)]);
+        success(&output);
+        success(&abbe(&["plan", text(&folder.join("plan.toml")), "--no-effects", "--quiet"]));
+        let said = String::from_utf8_lossy(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+        (said, abbe::files::machine(&folder.join("machine.toml")).unwrap())
+    };
+    let joint = |kind: &str, from: &str, to: &str, more: &str| {
+        format!(
+            "<joint name=\"{to}\" type=\"{kind}\"><parent link=\"{from}\"/><child link=\"{to}\"/>\
+             <origin xyz=\"0.3 0 0.1\"/>{more}</joint>"
+        )
+    };
+    let turns = |from: &str, to: &str, axis: &str, lower: &str, upper: &str| {
+        let limit =
+            format!("<axis xyz=\"{axis}\"/><limit lower=\"{lower}\" upper=\"{upper}\" effort=\"1\" velocity=\"1\"/>");
+        joint("revolute", from, to, &limit)
+    };
+    let arm = turns("base", "l1", "0 0 1", "-1", "1") + &turns("l1", "l2", "0 1 0", "-2.6", "-0.60000133");
+
+    let still = joint("fixed", "l2", "l3", "<axis xyz=\"0 0 0\"/>");
+    let (said, machine) = load(0, &(arm.clone() + &still + "<!-- written by <xacro:macro> -->"));
+    assert_eq!((said.as_str(), machine.axes.len()), ("", 2));
+    let (said, machine) = load(1, &turns("base", "l1", "0 0 1", "-1e16", "1e16"));
+    assert!(said.contains("joint `l1` states limits that no joint reaches: its travel is open"), "{said}");
+    assert_eq!(machine.axes[0].travel, None);
+
+    // Two fingers of one joint each behind an arm of two.
+    let fingers = turns("l2", "f1", "1 0 0", "0", "1") + &turns("l2", "f2", "1 0 0", "0", "1");
+    let (said, machine) = load(2, &(arm.clone() + &fingers));
+    assert!(said.contains("the arm ends at link `l2`, where it forks"), "{said}");
+    assert_eq!(machine.axes.len(), 2);
+
+    let call = "\n<xacro:gripper parent=\"l2\"/>";
+    let (said, _) = load(3, &(arm + call));
+    assert!(said.contains("<xacro:gripper> on line 2 is a program of xacro and was not run"), "{said}");
+}
