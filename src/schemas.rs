@@ -23,8 +23,6 @@ use crate::document::{
 use crate::exports::ExportResult;
 use crate::fleet::record::Record;
 use crate::fleet::run::RunResult;
-use crate::fleet::study::file::StudyFile;
-use crate::fleet::study::summary::StudyResult;
 use crate::import::ImportResult;
 
 /// A file.
@@ -65,11 +63,9 @@ pub const SCHEMAS: &[FileSchema] = &[
     file("compensate", "`abbe compensate --json`", of::<stream::Summary>),
     file("run", "`abbe fleet run --json`", of::<RunResult>),
     file("history", "`abbe fleet history --json`", of::<StatedHistory>),
-    file("study", "`abbe fleet study --json`", of::<StudyResult>),
     file("functions", "The error functions of `abbe volumetric --functions`, as JSON", || {
         schema::of::<error_functions::File>("Abbe file of error functions")
     }),
-    file("study-file", "The study file of `abbe fleet study`, as JSON", || schema::of::<StudyFile>("Abbe study file")),
     file("certificate", "`certificate.toml` of `abbe fit --dcc`, as JSON", || {
         schema::of::<Certificate>("Abbe file of a certificate")
     }),

@@ -8,7 +8,7 @@ use abbe::fleet::history;
 use abbe::fleet::options::Options;
 use abbe::fleet::store::{IfClaimed, Store};
 use abbe::fleet::unit::{self, Done, Places};
-use abbe::fleet::{compensations, list, study};
+use abbe::fleet::{compensations, list};
 use pyo3::prelude::*;
 use serde::Serialize;
 
@@ -97,36 +97,5 @@ pub fn fleet_history(
         let options = HistoryOptions { false_discovery_rate, tolerance_u, compensations: known };
         let found = history::history(&Store::existing(out)?, machine_id.as_deref(), &options)?;
         json(&StatedHistory::of_history(&found))
-    })
-}
-
-/// The number of draws of a study.
-#[pyfunction]
-pub fn study_draws(py: Python<'_>, file: PathBuf) -> PyResult<usize> {
-    work::run(py, None, move |_| Ok(study::file::read(&file)?.draws()))
-}
-
-/// Makes draws of a study that the folder does not have; returns how many it made.
-#[pyfunction]
-pub fn run_draws(py: Python<'_>, file: PathBuf, out: PathBuf, numbers: Vec<usize>) -> PyResult<usize> {
-    work::run(py, None, move |caller| {
-        let (study, store) = (study::file::read(&file)?, Store::open(out)?);
-        let mut computed = 0;
-        for number in numbers {
-            let done = study::run(&study, number, &store, IfClaimed::Wait, &|| caller.should_continue())?;
-            computed += usize::from(done.is_some_and(|(done, _)| done == Done::Computed));
-        }
-        Ok(computed)
-    })
-}
-
-/// The summary of the draws of a study as JSON, and the number of draws that are missing.
-#[pyfunction]
-pub fn study_summary(py: Python<'_>, file: PathBuf, out: PathBuf) -> PyResult<(String, usize)> {
-    work::run(py, None, move |_| {
-        let (study, store) = (study::file::read(&file)?, Store::open(out)?);
-        let draws = (0..study.draws()).map(|number| store.draw(&study.key, number));
-        let draws: Vec<_> = draws.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
-        Ok((json(&study::summary::summary(&draws))?, study.draws() - draws.len()))
     })
 }

@@ -47,9 +47,6 @@ fn _abbe(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(fleet::forget_missing_sessions, module)?)?;
     module.add_function(wrap_pyfunction!(fleet::fleet_records, module)?)?;
     module.add_function(wrap_pyfunction!(fleet::fleet_history, module)?)?;
-    module.add_function(wrap_pyfunction!(fleet::study_draws, module)?)?;
-    module.add_function(wrap_pyfunction!(fleet::run_draws, module)?)?;
-    module.add_function(wrap_pyfunction!(fleet::study_summary, module)?)?;
     module.add_function(wrap_pyfunction!(work::set_threads, module)?)?;
     module.add_function(wrap_pyfunction!(work::threads, module)?)?;
     Ok(())

@@ -287,6 +287,7 @@ impl Session {
         noise_um: Option<f64>,
         noise_arcsec: Option<f64>,
         draw_setups: bool,
+        hide_effects: bool,
     ) -> PyResult<(Session, Vec<(String, f64, String)>, Vec<String>)> {
         let state = self.state();
         let (next, truth, warnings) = work::run(py, None, move |_| {
@@ -308,6 +309,10 @@ impl Session {
             if let Some(noise_arcsec) = noise_arcsec {
                 session.noise_rad = noise_rad;
                 sources.text.set_noise_of_angles(noise_arcsec);
+            }
+            if hide_effects {
+                session.effects.clear();
+                sources.text.remove(&["effect"]);
             }
             let truth = simulated.truth.into_iter().map(|own| (own.id, own.value, own.unit));
             Ok((State::new(session, sources, Origin::default()), truth.collect(), simulated.warnings))

@@ -95,6 +95,14 @@ def test_simulation(command, chapter5, tmp_path):
             # Files have times to 1e-12 s.
             assert column == pytest.approx(other.readings(test)[name], rel=1e-14, abs=1e-12), (test, name)
     assert session.fit()["EX0C"].value == pytest.approx(other.fit()["EX0C"].value, rel=1e-9)
+    # A hidden effect stands in the readings, and not in the session.
+    truth = abbe.Session.read(SESSIONS / PLANS[1])
+    truth.add_effect(component="EZC", driver="C", shape="harmonic", order=2)
+    hidden = truth.simulate({**values, "EZC~C:h2.cos": 2.0}, seed=7, hide_effects=True)
+    assert hidden.effects == () and "[[effect]]" not in hidden.to_toml()
+    c = np.radians(hidden.readings("C150")["c_deg"])
+    difference = hidden.readings("C150")["length_mm"] - session.readings("C150")["length_mm"]
+    assert np.corrcoef(difference, np.cos(2 * c))[0, 1] ** 2 > 0.9
 
 
 def test_compensation(command, measured, tmp_path):

@@ -70,7 +70,7 @@ struct Arguments {
     /// Suppress tables and progress output; warnings and errors stay.
     #[arg(short, long, global = true)]
     quiet: bool,
-    /// Number of threads; by default all processors, but one for `fleet run` and `fleet study`.
+    /// Number of threads; by default all processors, but one for `fleet run`.
     #[arg(long, global = true, value_name = "N", value_parser = values::threads())]
     threads: Option<u32>,
 }
@@ -109,7 +109,7 @@ commands! {
     Plan: plan::PlanArguments = "State what planned tests identify, how surely, and what improves.";
     New: new::NewArguments = "Create a machine and a session.";
     Completions: completions::CompletionArguments = "Write the completions of a shell.";
-    Fleet: fleet::FleetArguments = "Analyse many sessions and show machines over time; simulate studies.";
+    Fleet: fleet::FleetArguments = "Analyse many sessions and show machines over time.";
     Import: import::ImportArguments = "Turn foreign files of readings into a session.";
     Schema: schema::SchemaArguments = "Print the JSON Schema of a file or a result.";
     Sheet: sheet::SheetArguments = "Write set-up sheets of planned tests.";

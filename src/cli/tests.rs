@@ -96,8 +96,6 @@ fn examples_of_options_are_accepted() {
                 "equation" => &["SESSION", "--test", "T"],
                 "poses" => &["SESSION", "--poses", "3"],
                 "history" => &["DIR"],
-                "study" if example.contains("--out") => &["STUDY"],
-                "study" => &["STUDY", "--out", "DIR"],
                 "run" if example.contains("--sessions") => &["--out", "DIR"],
                 "sheet" if example.contains("--program-number") => &["SESSION", "--out", "OUT", "--control", "fanuc"],
                 "simulate" | "paper" | "run" | "sheet" => &["SESSION", "--out", "OUT"],
@@ -122,7 +120,7 @@ fn examples_of_options_are_accepted() {
                 [positional @ .., name, _] if is_given(name) => positional,
                 all => all,
             };
-            let group = ["run", "history", "study"].contains(&command.get_name()).then_some("fleet");
+            let group = ["run", "history"].contains(&command.get_name()).then_some("fleet");
             let words = ["abbe"].into_iter().chain(group).chain([command.get_name()]);
             let words = words.chain(required.iter().copied()).chain(example.split(' '));
             let parsed = Arguments::command().try_get_matches_from(words);

@@ -4,8 +4,7 @@
 //!   inputs and options;
 //! - [`record`]: the result of one session, as JSON has it;
 //! - [`store`]: a folder of records, each written completely or not at all;
-//! - [`pool`]: units of work on several threads; [`run`]: what a run did;
-//! - [`study`]: simulated sessions and their analysis;
+//! - [`run`]: units of work on several threads, and what was done;
 //! - [`list`]: session files from files, folders and lists;
 //! - [`history`]: the machines of a folder over time; [`conformity`]: their decisions; [`compensations`]: the file of
 //!   known ones; [`date`]: the date of a session.
@@ -18,11 +17,9 @@ pub mod date;
 pub mod history;
 pub mod list;
 pub mod options;
-pub mod pool;
 pub mod record;
 pub mod run;
 pub mod store;
-pub mod study;
 pub mod unit;
 use std::fmt::Display;
 use std::path::Path;
@@ -36,6 +33,9 @@ pub const BUILD: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("ABBE_SOURC
 
 /// The caller ended the work.
 pub const INTERRUPTED: Code = Code { area: Area::Other, word: "interrupted" };
+
+/// What a unit of work asks before each of its steps: whether to go on.
+pub type ShouldContinue<'g> = &'g (dyn Fn() -> bool + Sync);
 
 /// The caller ended the work before the session was done.
 fn interrupted() -> Diagnostic {

@@ -16,8 +16,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::record::{Record, SCHEMA_VERSION};
-use super::study::draw::Draw;
-use super::{interrupted, unreadable, unusable, unwritable};
+use super::{ShouldContinue, interrupted, unreadable, unusable, unwritable};
 use crate::temporary::{self, TemporaryFile};
 
 /// Records with their sessions, and what has no record: its machine where it is known, and the file.
@@ -64,7 +63,7 @@ impl Pointer {
     }
 }
 
-/// What to do with a session or a draw on which another process is at work.
+/// What to do with a session on which another process is at work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IfClaimed {
     /// Skip it.
@@ -73,9 +72,9 @@ pub enum IfClaimed {
     Wait,
 }
 
-/// The right to make a record or a draw. It is a locked file, so that it ends with its process, on whatever computer.
+/// The right to make a record. It is a locked file, so that it ends with its process, on whatever computer.
 #[derive(Debug)]
-pub struct Claim {
+pub(crate) struct Claim {
     place: PathBuf,
     /// Holds the lock.
     _file: File,
@@ -88,46 +87,18 @@ impl Drop for Claim {
     }
 }
 
-/// What there is of a result.
-pub(crate) enum Search<T> {
-    /// The result.
-    Found(T),
+/// What there is of a record.
+pub(crate) enum Search {
+    /// The record.
+    Found(Box<Record>),
     /// None, and the right to make it.
     Claimed(Claim),
     /// None, and another process is at work on it.
     Skipped,
 }
 
-/// Time between two looks at a result on which another process is at work.
+/// Time between two looks at a record on which another process is at work.
 const WAIT: Duration = Duration::from_millis(100);
-
-/// Looks for a result, and claims it if it is missing.
-///
-/// # Errors
-/// Those of the two; `INTERRUPTED` if `should_continue` returned `false` while another process was at work.
-pub(crate) fn found_or_claimed<T>(
-    found: impl Fn() -> Result<Option<T>, Diagnostic>,
-    claim: impl Fn() -> Result<Option<Claim>, Diagnostic>,
-    if_claimed: IfClaimed,
-    should_continue: &(dyn Fn() -> bool + Sync),
-) -> Result<Search<T>, Diagnostic> {
-    loop {
-        if let Some(result) = found()? {
-            return Ok(Search::Found(result));
-        }
-        if let Some(claim) = claim()? {
-            // The other process may have ended its work since the look at the result.
-            return Ok(found()?.map_or(Search::Claimed(claim), Search::Found));
-        }
-        if if_claimed == IfClaimed::Skip {
-            return Ok(Search::Skipped);
-        }
-        if !should_continue() {
-            return Err(interrupted());
-        }
-        std::thread::sleep(WAIT);
-    }
-}
 
 impl Store {
     /// The folder, made if it does not exist.
@@ -173,27 +144,41 @@ impl Store {
         self.put(&self.place("results", &record.key), record)
     }
 
+    /// Looks for the record of a key, and claims it if it is missing.
+    ///
+    /// # Errors
+    /// If the folder cannot be read or written; `INTERRUPTED` if `should_continue` returned `false` while another process
+    /// was at work.
+    pub(crate) fn found_or_claimed(
+        &self,
+        key: &str,
+        if_claimed: IfClaimed,
+        should_continue: ShouldContinue<'_>,
+    ) -> Result<Search, Diagnostic> {
+        let found = || Ok::<_, Diagnostic>(self.record(key)?.map(|record| Search::Found(Box::new(record))));
+        loop {
+            if let Some(found) = found()? {
+                return Ok(found);
+            }
+            if let Some(claim) = self.claim(key)? {
+                // The other process may have ended its work since the look at the record.
+                return Ok(found()?.unwrap_or(Search::Claimed(claim)));
+            }
+            if if_claimed == IfClaimed::Skip {
+                return Ok(Search::Skipped);
+            }
+            if !should_continue() {
+                return Err(interrupted());
+            }
+            std::thread::sleep(WAIT);
+        }
+    }
+
     /// Claims the record of a key; `None` if another process or thread has claimed it.
-    ///
-    /// # Errors
-    /// If nothing can be written there.
-    pub fn claim(&self, key: &str) -> Result<Option<Claim>, Diagnostic> {
-        self.claim_place(&self.place("results", key))
-    }
-
-    /// Claims a draw of a study; `None` if another process or thread has claimed it.
-    ///
-    /// # Errors
-    /// If nothing can be written there.
-    pub fn claim_draw(&self, study: &str, number: usize) -> Result<Option<Claim>, Diagnostic> {
-        self.claim_place(&self.place_of_draw(study, number))
-    }
-
-    fn claim_place(&self, result: &Path) -> Result<Option<Claim>, Diagnostic> {
-        let name = result.file_stem().unwrap_or_default().to_string_lossy();
-        let place = result.with_file_name(format!(".{name}{CLAIM}"));
+    fn claim(&self, key: &str) -> Result<Option<Claim>, Diagnostic> {
+        let place = self.place("results", key).with_file_name(format!(".{key}{CLAIM}"));
         let fault = |source| unwritable(&place, source);
-        std::fs::create_dir_all(result.parent().unwrap_or(&self.folder)).map_err(fault)?;
+        std::fs::create_dir_all(place.parent().unwrap_or(&self.folder)).map_err(fault)?;
         let file = OpenOptions::new().create(true).truncate(false).write(true).open(&place).map_err(fault)?;
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => Ok(None),
@@ -204,31 +189,9 @@ impl Store {
 
     /// Removes what processes that no longer run have left: temporary files and claims.
     pub fn remove_stale(&self) {
-        for kind in ["results", "sessions", "studies"] {
-            remove_stale_below(&self.folder.join(kind), 2);
+        for kind in ["results", "sessions"] {
+            remove_stale_below(&self.folder.join(kind), 1);
         }
-    }
-
-    /// A draw of a study; `None` if it is missing or damaged.
-    ///
-    /// # Errors
-    /// If an existing file cannot be read.
-    pub fn draw(&self, study: &str, number: usize) -> Result<Option<Draw>, Diagnostic> {
-        let contents = read(&self.place_of_draw(study, number))?;
-        Ok(contents.and_then(|contents| serde_json::from_slice(&contents).ok()))
-    }
-
-    /// Writes a draw of a study.
-    ///
-    /// # Errors
-    /// If it cannot be written. Nothing is left of it then.
-    pub fn write_draw(&self, study: &str, draw: &Draw) -> Result<(), Diagnostic> {
-        self.put(&self.place_of_draw(study, draw.number), draw)
-    }
-
-    fn place_of_draw(&self, study: &str, number: usize) -> PathBuf {
-        let study = study.get(..16).unwrap_or(study);
-        self.folder.join("studies").join(study).join(format!("{:04}", number / 1000)).join(format!("{number:07}.json"))
     }
 
     /// Notes the record of a session file, unless the same note is there. A file has one note, whether it is named by
@@ -340,7 +303,7 @@ impl Store {
     }
 }
 
-/// Largest size of a record, a note or a draw, bytes: a thousand parameters with their covariance take a third.
+/// Largest size of a record or a note, bytes: a thousand parameters with their covariance take a third.
 const MAX_BYTES: u64 = 64 << 20;
 
 /// The contents of a file; `None` if there is none. What this program did not write, a device or a file beyond the

@@ -20,8 +20,8 @@ use sha2::{Digest, Sha256};
 
 use super::options::Options;
 use super::record::{BaseRecord, EffectRecord, ErrorRecord, MachineRecord, Record, SCHEMA_VERSION, ValidationRecord};
-use super::store::{IfClaimed, Pointer, Search, Store, found_or_claimed};
-use super::{BUILD, interrupted};
+use super::store::{IfClaimed, Pointer, Search, Store};
+use super::{BUILD, ShouldContinue, interrupted};
 
 /// Bits of a seed: every reader of JSON keeps an integer of this size.
 const SEED_BITS: u32 = 52;
@@ -69,20 +69,19 @@ pub fn run(
     places: &Places,
     store: &Store,
     if_claimed: IfClaimed,
-    should_continue: &(dyn Fn() -> bool + Sync),
+    should_continue: ShouldContinue<'_>,
 ) -> Result<Option<(Done, Pointer)>, Diagnostic> {
     let inputs = inputs(file, options, places);
     let key = inputs.record.key.clone();
-    let (done, record) =
-        match found_or_claimed(|| store.record(&key), || store.claim(&key), if_claimed, should_continue)? {
-            Search::Skipped => return Ok(None),
-            Search::Found(record) => (Done::Kept, record),
-            Search::Claimed(_claim) => {
-                let record = record(inputs, should_continue)?;
-                store.write(&record)?;
-                (Done::Computed, record)
-            }
-        };
+    let (done, record) = match store.found_or_claimed(&key, if_claimed, should_continue)? {
+        Search::Skipped => return Ok(None),
+        Search::Found(record) => (Done::Kept, *record),
+        Search::Claimed(_claim) => {
+            let record = record(inputs, should_continue)?;
+            store.write(&record)?;
+            (Done::Computed, record)
+        }
+    };
     let pointer = Pointer::new(file, &record);
     store.note(&pointer)?;
     Ok(Some((done, pointer)))
@@ -96,7 +95,7 @@ pub fn analyse(
     file: &Path,
     options: &Options,
     places: &Places,
-    should_continue: &(dyn Fn() -> bool + Sync),
+    should_continue: ShouldContinue<'_>,
 ) -> Result<Record, Diagnostic> {
     record(inputs(file, options, places), should_continue)
 }
@@ -194,7 +193,7 @@ fn model_of(machine_id: &str, places: &Places) -> Option<Model> {
 }
 
 /// Analyses what was read.
-fn record(inputs: Inputs, should_continue: &(dyn Fn() -> bool + Sync)) -> Result<Record, Diagnostic> {
+fn record(inputs: Inputs, should_continue: ShouldContinue<'_>) -> Result<Record, Diagnostic> {
     let Inputs { read, mut record, model } = inputs;
     let failed = |record: Record, stage: &str, message: String| {
         let error = Some(ErrorRecord { stage: stage.to_string(), message });
@@ -242,11 +241,7 @@ fn record(inputs: Inputs, should_continue: &(dyn Fn() -> bool + Sync)) -> Result
 const FAULT: &str = "a fault of abbe: the computation broke off; please report it with the session";
 
 /// Fit and trace.
-fn identify(
-    record: &mut Record,
-    session: &Session,
-    should_continue: &(dyn Fn() -> bool + Sync),
-) -> Result<(), Diagnostic> {
+fn identify(record: &mut Record, session: &Session, should_continue: ShouldContinue<'_>) -> Result<(), Diagnostic> {
     if record.options.no_trace {
         let found = SessionFit::of(session, record.seed)?;
         record.base = BaseRecord::of(&found.problem, &found.fit)?;

@@ -3,7 +3,7 @@
 //! - [`block`]: a report as blocks; [`table`]: a table as data; [`number`]: digits and units; [`figure`]: plots;
 //! - one file per result: [`fit`], [`base`], [`trace`], [`validate`], [`plan`], [`next_test`], [`mod@poses`], [`method`],
 //!   [`repeated`], [`self_calibration`], [`simulation`], [`patterns`], [`volumetric`], [`compare`], [`compensate`],
-//!   [`compensation`], [`export`], [`import`], [`nc`], `history`, `run`, `study`;
+//!   [`compensation`], [`export`], [`import`], [`nc`], `history`, `run`;
 //! - parts of several results: [`statements`], [`quality`], [`parameters`], [`effects`], [`confounded`],
 //!   [`cross_validation`], [`circular`], [`conformity`], [`plausibility`], [`mod@pointing`], [`effect`], [`uniqueness`], [`readings`],
 //!   [`session`], [`commands`], [`provenance`];
@@ -51,7 +51,6 @@ pub mod simulation;
 pub mod statements;
 pub mod straightness;
 #[cfg(feature = "fleet")]
-pub mod study;
 pub mod table;
 pub mod trace;
 pub mod uniqueness;

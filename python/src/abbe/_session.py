@@ -246,6 +246,7 @@ class Session(Predicting):
         noise_um: float | None = None,
         noise_arcsec: float | None = None,
         draw_setups: bool = False,
+        hide_effects: bool = False,
     ) -> Session:
         """Simulate readings at the planned states of the tests.
 
@@ -262,6 +263,8 @@ class Session(Predicting):
             Standard deviation of the noise of angles; that of the session by default.
         draw_setups : bool
             Draw the set-up parameters from their priors.
+        hide_effects : bool
+            Omit the declared effects from the session that is returned.
 
         Returns
         -------
@@ -279,7 +282,7 @@ class Session(Predicting):
         True
         """
         given = [(name, *quantity(name, value)) for name, value in (values or {}).items()]
-        return Session._of(self._handle.simulate(given, seed, noise_um, noise_arcsec, draw_setups)[0])
+        return Session._of(self._handle.simulate(given, seed, noise_um, noise_arcsec, draw_setups, hide_effects)[0])
 
     def fit(self, *, seed: int = 1, allow_implausible: bool = False) -> Fit:
         """Estimate the parameters from the readings, as ``abbe fit``.

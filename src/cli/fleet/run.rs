@@ -1,18 +1,20 @@
 //! `abbe fleet run`: analyse many sessions, and keep what is done.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use abbe::analysis::Candidates;
-use abbe::fleet::list;
 use abbe::fleet::options::Options;
-use abbe::fleet::run::RunResult;
+use abbe::fleet::run::{self, RunResult};
 use abbe::fleet::store::Store;
 use abbe::fleet::unit::{self, Places};
+use abbe::fleet::{INTERRUPTED, ShouldContinue, list};
 use abbe::model::Diagnostic;
 use abbe::model::words::counted;
 use clap::Args;
 
-use super::all;
+use crate::cli::failure::stopped;
+use crate::cli::interrupt::Interrupts;
+use crate::cli::message::progress_bar;
 use crate::cli::results::{OutputArguments, Read};
 use crate::report;
 
@@ -84,11 +86,20 @@ pub fn run(arguments: &RunArguments, threads: u32) -> Result<(), Diagnostic> {
         exclude: arguments.search.exclude.clone(),
     };
     let places = Places { models: arguments.models.clone(), allow_outside: arguments.allow_outside };
-    let words = ("sessions", counted(files.len(), "session"));
-    let (done, ended) = all(&files, words, (threads, arguments.output.quiet), |file, if_claimed, should_continue| {
+    let (bar, interrupts) = (progress_bar(files.len(), "sessions", arguments.output.quiet), Interrupts::noticed());
+    let unit = |file: &Path, if_claimed, should_continue: ShouldContinue<'_>| {
         unit::run(file, &options, &places, &store, if_claimed, should_continue)
-    });
+    };
+    let (done, ended) = run::all(&files, threads as usize, &|| !interrupts.came(), unit, &|| bar.inc(1));
+    bar.finish_and_clear();
     let result = RunResult::of(&arguments.out, files.len(), &done, forgotten);
     arguments.output.put(&outputs, &report::run::report(&result), &result, &Read::default())?;
-    ended
+    match ended {
+        None => Ok(()),
+        Some(error) if error.code == INTERRUPTED => {
+            let count = counted(files.len(), "session");
+            Err(stopped(format!("interrupted: {} of {count} done; the same command continues", done.len())))
+        }
+        Some(error) => Err(error),
+    }
 }

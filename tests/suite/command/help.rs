@@ -84,8 +84,7 @@ fn every_example_of_the_help_runs() {
     for command in commands {
         let mut of_command = examples(&help(&[command, "--help"]));
         if command == "fleet" {
-            of_command
-                .extend(["run", "history", "study"].iter().flat_map(|own| examples(&help(&["fleet", own, "--help"]))));
+            of_command.extend(["run", "history"].iter().flat_map(|own| examples(&help(&["fleet", own, "--help"]))));
         }
         assert!(
             of_command.iter().any(|line| line.starts_with(&format!("abbe {command}"))),
@@ -99,9 +98,7 @@ fn every_example_of_the_help_runs() {
     }
     lines.extend(later);
     let folder = tempfile::tempdir().unwrap();
-    for ready in ["sessions", "studies"] {
-        copy(&workspace().join(ready), &folder.path().join(ready));
-    }
+    copy(&workspace().join("sessions"), &folder.path().join("sessions"));
     // Files of the user that examples read.
     std::fs::write(folder.path().join("program.csv"), "x_mm,y_mm,z_mm,a_deg,c_deg\n10,20,30,40,50\n").unwrap();
     std::fs::write(folder.path().join("poses.csv"), "px_mm,py_mm,pz_mm,i,j,k\n10,20,30,0,0.6,0.8\n").unwrap();

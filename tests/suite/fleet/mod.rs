@@ -1,6 +1,5 @@
-//! Many sessions, histories and studies.
+//! Many sessions and their history.
 
 pub mod conformity;
 pub mod history;
 pub mod run;
-pub mod study;

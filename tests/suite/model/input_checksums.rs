@@ -96,18 +96,13 @@ fn a_pipe_has_the_checksum_of_what_was_read() {
 }
 
 #[test]
-fn known_compensations_and_studies_are_read_once() {
+fn known_compensations_are_read_once() {
     let place = run::fleet(6, run::monthly);
     run::run(&place, "--no-trace");
     place.put("known.csv", "machine_id,date,parameter,change,unit\nM0,2020-02-01,EC0Y,1,arcsec\n");
     let line =
         "mkfifo pipe; cat known.csv > pipe & abbe fleet history results --known-changes pipe --json out.json --quiet";
     assert_eq!(checksums(&document(&place, line)), [sha256(&place.at("known.csv"))]);
-    let study = "[study]\nanalysis = \"fit\"\ndraws = 2\n[[plan]]\nname = \"a\"\nsession = \"fleet/s00/session.toml\"\n\
-        [[noise]]\nname = \"a\"\num = 0.3\n[[effect]]\nname = \"none\"\n";
-    place.put("study.toml", study);
-    let line = "mkfifo study; cat study.toml > study & abbe fleet study study --out draws --json out.json --quiet";
-    assert_eq!(checksums(&document(&place, line)), [sha256(&place.at("study.toml"))]);
 }
 
 /// The record of a run holds the checksums of what was read, and a session from a pipe is no longer read a second time.

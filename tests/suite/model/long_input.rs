@@ -34,9 +34,6 @@ fn long_names() -> TestFolder {
     place.put("later.toml", &later);
     place.put("list.txt", &format!("session.toml\nlater.toml\n{name}\n"));
     place.put("positions.csv", "x_mm,y_mm\n0,0\n10,20\n");
-    let study = "[study]\nanalysis = \"fit\"\ndraws = 2\n[[plan]]\nname = \"NAME\"\nsession = \"session.toml\"\n\
-        [[noise]]\nname = \"NAME\"\num = 0.3\n[[effect]]\nname = \"NAME\"\n";
-    place.put("study.toml", &study.replace("NAME", &name));
     place
 }
 
@@ -67,7 +64,6 @@ fn every_table_is_printed_with_a_name_of_100_000_characters() {
         "fleet history results --all --report history.html",
         "fleet history results --pages pages",
         "fleet history listed",
-        "fleet study study.toml --out draws",
     ] {
         let output = run(&place, line);
         let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -102,8 +98,6 @@ fn a_message_quotes_80_characters_of_a_long_input() {
     assert!(run(&place, "fit session.toml --save model.json").status.success());
     assert!(run(&place, "fleet run session.toml --out results --no-trace").status.success());
     let model = fs::read_to_string(place.at("model.json")).unwrap();
-    let study = "[study]\nanalysis = \"fit\"\ndraws = 2\n[[plan]]\nname = \"a\"\nsession = \"session.toml\"\n\
-        [[noise]]\nname = \"a\"\num = 0.3\n[[effect]]\nname = \"a\"\n";
     let put = |name: &str, text: &str, from: &str, to: &str| {
         assert!(text.contains(from), "{name}: {from}");
         place.put(name, &text.replacen(from, to, 1));
@@ -159,15 +153,6 @@ fn a_message_quotes_80_characters_of_a_long_input() {
         put("long.json", &model, from, &to);
         is_short(what, "validate long.json session.toml");
         is_short(what, "compare long.json session.toml");
-    }
-    for (what, from, to) in [
-        ("a key of a study", "draws", long.clone()),
-        ("an analysis of a study", "\"fit\"", format!("\"{long}\"")),
-        ("a session of a study", "session.toml", long.clone()),
-        ("a value of a study", "0.3", format!("\"{long}\"")),
-    ] {
-        put("long.toml", study, from, &to);
-        is_short(what, "fleet study long.toml --out draws");
     }
     for (what, text) in [
         ("a column of compensations", format!("machine_id,{long}\nM,1\n")),

@@ -23,7 +23,7 @@ const SECONDS: u64 = 100;
 const MAX_MESSAGE: usize = 20_000;
 
 /// The files that are mutated, each with the commands that read it.
-const INPUTS: [(&str, &[&str]); 22] = [
+const INPUTS: [(&str, &[&str]); 21] = [
     (
         "session.toml",
         &[
@@ -57,7 +57,6 @@ const INPUTS: [(&str, &[&str]); 22] = [
         ],
     ),
     ("positions.csv", &["compensate model.json positions.csv --out out.csv --json out.json"]),
-    ("study.toml", &["fleet study study.toml --out out --json out.json"]),
     ("list.txt", &["fleet run --sessions list.txt --out out --no-trace --json out.json"]),
     ("known.csv", &["fleet history results --known-changes known.csv --json out.json"]),
     (
@@ -163,11 +162,6 @@ fn folder() -> TestFolder {
     let facets: String = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]].iter().map(facet).collect();
     place.put("body.stl", &format!("solid t\n{facets}endsolid t\n"));
     place.put("positions.csv", "time_s,x_mm,y_mm\n0,0,0\n1,10,20\n2,-30,5\n");
-    place.put(
-        "study.toml",
-        "[study]\nanalysis = \"fit\"\ndraws = 2\nlocation_um = 20\nlocation_arcsec = 8\n[[plan]]\nname = \"a\"\n\
-         session = \"session.toml\"\n[[noise]]\nname = \"white\"\num = 0.3\n[[effect]]\nname = \"none\"\n",
-    );
     let joint = |k: usize, z: f64| {
         format!(
             "  <joint name=\"j{k}\" type=\"revolute\">\n    <parent link=\"l{k}\"/><child link=\"l{}\"/>\n    <origin xyz=\"0.3 0 {z}\" rpy=\"{} 0 0\"/>\n\

@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 use crate::suite::{abbe, workspace};
 
 /// The commands, and the subject of `abbe schema` for each.
-const COMMANDS: [(&str, &str); 22] = [
+const COMMANDS: [(&str, &str); 21] = [
     ("abbe fit", "fit"),
     ("abbe compare --repeated", "repeat"),
     ("abbe fit --method circle, cone or two-plane", "geometric"),
@@ -30,7 +30,6 @@ const COMMANDS: [(&str, &str); 22] = [
     ("abbe fleet run", "run"),
     ("The result of a session in the folder of abbe fleet run", "record"),
     ("abbe fleet history", "history"),
-    ("abbe fleet study", "study"),
 ];
 
 const HEAD: &str = "# JSON results

@@ -8,16 +8,15 @@ use serde_json::Value;
 use crate::suite::report::json_page::{kept_current, kind, one_line, schema, unit, words};
 
 /// The files, and the subject of `abbe schema` for each.
-const FILES: [(&str, &str); 4] = [
+const FILES: [(&str, &str); 3] = [
     ("Sessions and machines", "session"),
     ("Error functions of abbe volumetric", "functions"),
-    ("Studies of abbe fleet study", "study-file"),
     ("Certificates of abbe fit --dcc", "certificate"),
 ];
 
 const HEAD: &str = "# Keys of files
 
-*Reader: the metrologist and the engineer who write sessions, machines, studies and error functions. This page is generated from the
+*Reader: the metrologist and the engineer who write sessions, machines and error functions. This page is generated from the
 schemas by a test.*
 
 This page lists every table of a file that is written by hand, and its keys. Example: a test has the keys of [test](#test), and a

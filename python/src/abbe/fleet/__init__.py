@@ -3,8 +3,7 @@
 - :func:`run`: analyse sessions, on a local cluster or on any scheduler of Dask;
 - :func:`analyse` and :func:`map_in_pandas`: the unit of work as a pure function, for other engines;
 - :func:`write_dataset`: the results as a data set in Parquet; :data:`SCHEMAS`: its tables;
-- :func:`history`: the parameters of every machine over time;
-- :func:`study`: simulated sessions and their analysis: power, false claims, coverage.
+- :func:`history`: the parameters of every machine over time.
 
 ``pip install abbe[fleet]`` adds Dask, PyArrow and DuckDB.
 """
@@ -12,7 +11,6 @@
 from ._dataset import SCHEMA_VERSION, SCHEMAS, Dataset, write_dataset
 from ._history import history
 from ._run import Failure, Run, run
-from ._study import study
 from ._work import analyse, map_in_pandas
 
 __all__ = [
@@ -25,6 +23,5 @@ __all__ = [
     "history",
     "map_in_pandas",
     "run",
-    "study",
     "write_dataset",
 ]

@@ -151,26 +151,11 @@ def run(
     forgotten = _abbe.forget_missing_sessions(out, paths)
     common = (out, options, None if models is None else os.path.abspath(models), allow_outside, threads)
     result = Run(out=out, sessions=len(files), forgotten=forgotten)
-    through(client, workers, (run_sessions, files, common), batch, retries, progress, result)
-    return result
-
-
-def through(
-    client: str | Client | None,
-    workers: int | None,
-    work: tuple[Callable[..., list[Outcome]], Sequence[Any], tuple[Any, ...]],
-    batch: int | None,
-    retries: int,
-    progress: bool | Callable[[int, int], object],
-    result: Run,
-) -> None:
-    """Do work, a function of batches of items with common arguments, on a cluster. Counts go to `result`."""
-    function, items, common = work
-    if not items:
-        return
-    with _connected(client, workers, len(items)) as connected:
+    if files:
         show = _bar if progress is True else (progress or (lambda done, all: None))
-        _Work(connected, function, common, retries, result, show).through(items, batch)
+        with _connected(client, workers, len(files)) as connected:
+            _Work(connected, common, retries, result, show).through(files, batch)
+    return result
 
 
 def _present_workers(client: Client) -> int:
@@ -231,14 +216,12 @@ class _Work:
     def __init__(
         self,
         client: Client,
-        function: Callable[..., list[Outcome]],
         common: tuple[Any, ...],
         retries: int,
         result: Run,
         show: Callable[[int, int], object],
     ) -> None:
         self._client = client
-        self._function = function
         self._common = common
         self._retries = retries
         self._result = result
@@ -251,7 +234,7 @@ class _Work:
 
     def _submit(self, items: list[Any]) -> Future:
         # Dask itself repeats a batch whose worker ended, up to its own limit; then the batch comes back.
-        future = self._client.submit(self._function, items, *self._common, key=f"abbe-{uuid.uuid4()}", pure=False)
+        future = self._client.submit(run_sessions, items, *self._common, key=f"abbe-{uuid.uuid4()}", pure=False)
         self._items[future.key] = items
         return future
 
@@ -366,8 +349,6 @@ class _Work:
         self._result.computed += computed
         self._result.kept += not computed
         self._result.seconds += seconds
-        if text is None:
-            return
         note = json.loads(text)
         if note["error"] is not None:
             self._result.failed.append(Failure(file, note["error"]))

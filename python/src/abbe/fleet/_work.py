@@ -15,9 +15,8 @@ if TYPE_CHECKING:
 
 Path: TypeAlias = "str | os.PathLike[str]"
 
-Outcome: TypeAlias = "tuple[Any, bool, str | None, float]"
-"""What was done (a session file, the number of a draw), whether it was computed, the note of a session as JSON, and the
-seconds that it took."""
+Outcome: TypeAlias = "tuple[str, bool, str, float]"
+"""A session file, whether it was computed, its note as JSON, and the seconds that it took."""
 
 
 def options_json(
@@ -106,15 +105,4 @@ def run_sessions(
         start = time.perf_counter()
         computed, note = _abbe.run_session(file, out, options, models, allow_outside)
         outcomes.append((file, computed, note, time.perf_counter() - start))
-    return outcomes
-
-
-def run_draws(numbers: Sequence[int], out: str, study: str) -> list[Outcome]:
-    """Make the draws of a batch of a study. What a worker of Dask does."""
-    _abbe.set_threads(1)
-    outcomes: list[Outcome] = []
-    for number in numbers:
-        start = time.perf_counter()
-        computed = _abbe.run_draws(study, out, [number]) == 1
-        outcomes.append((number, computed, None, time.perf_counter() - start))
     return outcomes
