@@ -10,7 +10,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use tempfile::{NamedTempFile, TempDir};
+use tempfile::{NamedTempFile, TempDir, TempPath};
 
 /// First characters of the name of a temporary file or folder.
 const PREFIX: &str = ".abbe-";
@@ -18,6 +18,10 @@ const PREFIX: &str = ".abbe-";
 const RANDOM: usize = 16;
 /// Last characters of the name of a temporary file.
 const SUFFIX: &str = ".tmp";
+/// Last characters of the name of a claim.
+const CLAIM: &str = ".claim";
+/// Digits of the SHA-256 that a claim is named by.
+const DIGITS: usize = 64;
 /// The locked file of a temporary folder.
 const LOCK: &str = "lock";
 /// Attempts to make a file that no other process removes before it is locked, and to remove a folder that grows.
@@ -53,12 +57,34 @@ impl TemporaryFile {
             made.map_err(|error| code.get().map_or(error, io::Error::from_raw_os_error))
         };
         for _ in 0..ATTEMPTS {
-            let (file, noted) = noted(make, |file| file.path())?;
-            if is_own(file.as_file(), file.path())? {
-                return Ok(TemporaryFile { file, _noted: noted });
+            let file = TemporaryFile::noted(make)?;
+            if is_own(file.as_file(), file.file.path())? {
+                return Ok(file);
             }
         }
         Err(io::Error::other("another process removes the temporary files"))
+    }
+
+    /// The claim of a SHA-256 in a folder, a locked file: `None` if another process or thread has claimed it. It ends with
+    /// its process, on whatever computer. On a file system without locks every claim is granted.
+    ///
+    /// # Errors
+    /// If it cannot be made.
+    pub fn claim(folder: &Path, sha256: &str) -> io::Result<Option<TemporaryFile>> {
+        let place = folder.join(format!(".{sha256}{CLAIM}"));
+        let file = OpenOptions::new().create(true).truncate(false).write(true).open(&place)?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => Ok(None),
+            // Removed before it is unlocked: who has opened it meanwhile looks for the result again.
+            Ok(()) | Err(TryLockError::Error(_)) => {
+                TemporaryFile::noted(|| Ok(NamedTempFile::from_parts(file, TempPath::try_from_path(place)?))).map(Some)
+            }
+        }
+    }
+
+    fn noted(make: impl FnOnce() -> io::Result<NamedTempFile>) -> io::Result<TemporaryFile> {
+        let (file, noted) = noted(make, |file| file.path())?;
+        Ok(TemporaryFile { file, _noted: noted })
     }
 
     /// The file itself.
@@ -170,20 +196,26 @@ pub fn remove_own() {
     std::mem::forget(own);
 }
 
-/// Removes the temporary files and folders in a folder that no process holds. What cannot be removed stays.
+/// Removes the temporary files, folders and claims in a folder that no process holds. What cannot be removed stays.
 pub fn remove_stale(folder: &Path) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     for entry in entries.filter_map(Result::ok) {
         let name = entry.file_name();
-        let Some(rest) = name.to_str().and_then(|name| name.strip_prefix(PREFIX)) else { continue };
+        let Some(name) = name.to_str() else { continue };
+        let rest = name.strip_prefix(PREFIX);
+        let is_file = || is_claim(name) || rest.and_then(|rest| rest.strip_suffix(SUFFIX)).is_some_and(is_random);
         match entry.file_type() {
-            Ok(kind) if kind.is_file() && rest.strip_suffix(SUFFIX).is_some_and(is_random) => {
-                remove_unlocked(&entry.path(), &entry.path());
-            }
-            Ok(kind) if kind.is_dir() && is_random(rest) => remove_folder(&entry.path()),
+            Ok(kind) if kind.is_file() && is_file() => remove_unlocked(&entry.path(), &entry.path()),
+            Ok(kind) if kind.is_dir() && rest.is_some_and(is_random) => remove_folder(&entry.path()),
             _ => {}
         }
     }
+}
+
+/// Whether a name is that of the claim of a checksum.
+fn is_claim(name: &str) -> bool {
+    let checksum = name.strip_prefix('.').and_then(|name| name.strip_suffix(CLAIM));
+    checksum.is_some_and(|text| text.len() == DIGITS && text.bytes().all(|byte| byte.is_ascii_hexdigit()))
 }
 
 /// Whether a part of a name is the random one of a temporary file or folder.
@@ -242,7 +274,8 @@ mod tests {
         std::fs::write(at(&format!("{full}/lock")), "").unwrap();
         std::fs::write(at(&format!("{full}/readings.csv")), "stale").unwrap();
         // Files of others.
-        let others = [".abbe-notes.txt", ".abbe-1.tmp", ".abbe-report.tmp", ".tmpAbCdEf", "session.toml"];
+        let others =
+            [".notes.claim", ".abbe-notes.txt", ".abbe-1.tmp", ".abbe-report.tmp", ".tmpAbCdEf", "session.toml"];
         for other in others {
             std::fs::write(at(other), "other").unwrap();
         }
@@ -260,7 +293,7 @@ mod tests {
         held.persist(&at("held")).unwrap();
         drop(held_folder);
         remove_stale(folder.path());
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 7);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 8);
     }
 
     #[test]

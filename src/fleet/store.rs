@@ -5,7 +5,7 @@
 //! that a reader finds the whole file or none, whoever writes at the same time. A file that is damaged counts as
 //! missing.
 
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::File;
 use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -21,9 +21,6 @@ use crate::temporary::{self, TemporaryFile};
 
 /// Records with their sessions, and what has no record: its machine where it is known, and the file.
 pub type Records = (Vec<(Pointer, Record)>, Vec<(Option<String>, String)>);
-
-/// Last characters of the name of a claim.
-const CLAIM: &str = ".claim";
 
 /// A folder of records.
 #[derive(Clone, Debug)]
@@ -72,27 +69,12 @@ pub enum IfClaimed {
     Wait,
 }
 
-/// The right to make a record. It is a locked file, so that it ends with its process, on whatever computer.
-#[derive(Debug)]
-pub(crate) struct Claim {
-    place: PathBuf,
-    /// Holds the lock.
-    _file: File,
-}
-
-impl Drop for Claim {
-    /// Removes the file before it unlocks it: who has opened it meanwhile looks for the result again.
-    fn drop(&mut self) {
-        let _ = std::fs::remove_file(&self.place);
-    }
-}
-
 /// What there is of a record.
 pub(crate) enum Search {
     /// The record.
     Found(Box<Record>),
     /// None, and the right to make it.
-    Claimed(Claim),
+    Claimed(TemporaryFile),
     /// None, and another process is at work on it.
     Skipped,
 }
@@ -155,12 +137,16 @@ impl Store {
         if_claimed: IfClaimed,
         should_continue: ShouldContinue<'_>,
     ) -> Result<Search, Diagnostic> {
+        let place = self.place("results", key);
+        let folder = place.parent().unwrap_or(&self.folder);
+        let fault = |source| unwritable(&place, source);
+        std::fs::create_dir_all(folder).map_err(fault)?;
         let found = || Ok::<_, Diagnostic>(self.record(key)?.map(|record| Search::Found(Box::new(record))));
         loop {
             if let Some(found) = found()? {
                 return Ok(found);
             }
-            if let Some(claim) = self.claim(key)? {
+            if let Some(claim) = TemporaryFile::claim(folder, key).map_err(fault)? {
                 // The other process may have ended its work since the look at the record.
                 return Ok(found()?.unwrap_or(Search::Claimed(claim)));
             }
@@ -174,23 +160,13 @@ impl Store {
         }
     }
 
-    /// Claims the record of a key; `None` if another process or thread has claimed it.
-    fn claim(&self, key: &str) -> Result<Option<Claim>, Diagnostic> {
-        let place = self.place("results", key).with_file_name(format!(".{key}{CLAIM}"));
-        let fault = |source| unwritable(&place, source);
-        std::fs::create_dir_all(place.parent().unwrap_or(&self.folder)).map_err(fault)?;
-        let file = OpenOptions::new().create(true).truncate(false).write(true).open(&place).map_err(fault)?;
-        match file.try_lock() {
-            Err(TryLockError::WouldBlock) => Ok(None),
-            // Without locks on this file system, two processes do the same work, with the same result.
-            Ok(()) | Err(TryLockError::Error(_)) => Ok(Some(Claim { place, _file: file })),
-        }
-    }
-
     /// Removes what processes that no longer run have left: temporary files and claims.
     pub fn remove_stale(&self) {
         for kind in ["results", "sessions"] {
-            remove_stale_below(&self.folder.join(kind), 1);
+            entries(&self.folder.join(kind))
+                .unwrap_or_default()
+                .iter()
+                .for_each(|shard| temporary::remove_stale(shard));
         }
     }
 
@@ -322,25 +298,6 @@ fn read(file: &Path) -> Result<Option<Vec<u8>>, Diagnostic> {
         Ok(_) => Ok(Some(contents)),
         Err(source) if source.kind() == ErrorKind::NotFound => Ok(None),
         Err(source) => Err(fault(source)),
-    }
-}
-
-/// Removes stale files in folders within a folder, so many levels deep.
-fn remove_stale_below(folder: &Path, levels: usize) {
-    temporary::remove_stale(folder);
-    for entry in entries(folder).unwrap_or_default() {
-        let name = entry.file_name().unwrap_or_default().to_string_lossy();
-        if name.starts_with('.') && name.ends_with(CLAIM) {
-            let opened = OpenOptions::new().write(true).open(&entry);
-            // A claim of a living process is locked.
-            if let Ok(file) = opened
-                && file.try_lock().is_ok()
-            {
-                drop(Claim { place: entry, _file: file });
-            }
-        } else if levels > 0 && !name.ends_with(".json") && entry.is_dir() {
-            remove_stale_below(&entry, levels - 1);
-        }
     }
 }
 
