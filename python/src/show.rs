@@ -81,21 +81,11 @@ impl Figure {
     /// The kind of chart.
     #[getter]
     fn kind(&self) -> &'static str {
-        match self.0.chart {
-            figure::Chart::Lines(_) => "lines",
-            figure::Chart::Values(_) => "values",
-            figure::Chart::Bars(_) => "bars",
-            figure::Chart::Bubbles(_) => "bubbles",
-            figure::Chart::Matrix(_) => "matrix",
-            figure::Chart::Polar(_) | figure::Chart::Panels(_) => "polar",
-            figure::Chart::Chain(_) => "chain",
-            figure::Chart::Machine(_) => "machine",
-            figure::Chart::SetUps(_) => "set-ups",
-        }
+        self.0.chart.kind
     }
 
     fn table(&self) -> Table {
-        Table(self.0.table())
+        Table(self.0.chart.table.clone())
     }
 
     fn svg(&self) -> String {

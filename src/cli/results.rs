@@ -183,7 +183,7 @@ fn write_plots(report: &Report, path: &Path, force: bool) -> Result<(), Diagnost
     let fonts = crate::report::figure::png::Fonts::bundled();
     let mut files = Vec::new();
     for figure in report.drawn() {
-        let data = csv::text(&figure.table()).map_err(Diagnostic::other)?;
+        let data = csv::text(&figure.chart.table).map_err(Diagnostic::other)?;
         files.push((format!("{}.svg", figure.name), svg::file(figure).into_bytes()));
         files.push((format!("{}.csv", figure.name), data));
         #[cfg(feature = "png")]

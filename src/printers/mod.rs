@@ -12,8 +12,8 @@ pub mod terminal;
 mod tests {
     use super::*;
     use crate::report::block::{Formula, KeyFigure, Report, Text};
-    use crate::report::figure::bars::{Bars, Fill};
-    use crate::report::figure::{Chart, Figure, Quantity};
+    use crate::report::figure::bars::{NAMED, bars};
+    use crate::report::figure::{Figure, Quantity};
     use crate::report::paper::{Part, Subject};
     use crate::report::provenance::Provenance;
     use crate::report::table::{Table, cells};
@@ -34,9 +34,8 @@ mod tests {
         report.brief(Text::Note("brief-words".into()));
         report.folded("fold-words", "detail-words");
         report.page("page-words");
-        let bars =
-            Bars { quantity: Quantity::new("x", ""), rows: vec![("bar".into(), 1.0, Fill::Named)], labels: Vec::new() };
-        report.figures([Figure::new("drawing", "figure-words", "", Chart::Bars(bars))]);
+        let bar = bars(&Quantity::new("x", ""), &[("bar".into(), 1.0, NAMED)], &[]);
+        report.figures([Figure::new("drawing", "figure-words", "", bar)]);
         report
     }
 

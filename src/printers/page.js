@@ -110,7 +110,7 @@
       }
       for (const element of [path, ...symbols]) element.style.display = isShown(traversal) ? "" : "none";
     }
-    for (const span of plot.svg.querySelectorAll(".division")) span.textContent = formatted(plot.um, plot.um);
+    for (const text of plot.svg.querySelectorAll(".division")) text.textContent = text.textContent.replace(/^\S+/, formatted(plot.um, plot.um));
     if (plot.interaction.scaled) {
       plot.svg.querySelectorAll(".tick").forEach((tick, i) => { tick.textContent = formatted((i - 4) * plot.um, plot.um); });
     }

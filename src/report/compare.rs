@@ -7,8 +7,8 @@ use abbe::model::words::counted;
 
 use super::block::{Report, Text};
 use super::commands::Commands;
-use super::figure::bars::{Row, Values};
-use super::figure::{Chart, Figure, Quantity};
+use super::figure::bars::{self, Row};
+use super::figure::{Figure, Quantity};
 use super::number::{p_equals, probability, quantity, unit, units, value_and_u};
 use super::statements;
 use super::table::{Cell, Table, cells, numbers};
@@ -143,16 +143,14 @@ fn figures(comparison: &Comparison, pair: &Pair) -> Vec<Figure> {
     let figure = |name: &str| {
         let of_unit = own(comparison, pair).map(|d| &d.change).filter(|change| change.unit == name).take(MAX_ROWS);
         let row = |change: &ParameterChange| {
-            let after = Some(MeasuredValue { value: change.value, u: change.u });
-            Row { name: change.id.clone(), before: None, after }
+            (change.id.clone(), [None, Some(MeasuredValue { value: change.value, u: change.u })])
         };
-        let quantity = Quantity::new("difference", name);
-        let labels = ["", "difference"].map(str::to_string);
+        let rows: Vec<Row> = of_unit.map(row).collect();
         Figure::new(
             format!("differences-{name}"),
             format!("Differences in {}", unit(name)),
             "Whiskers: ± 2 u.",
-            Chart::Values(Values { quantity, labels, rows: of_unit.map(row).collect() }),
+            bars::values(&Quantity::new("difference", name), ["", "difference"], &rows),
         )
     };
     names.map(figure).collect()

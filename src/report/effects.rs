@@ -9,10 +9,10 @@ use abbe::trace::result::{AliasResult, EffectName, EffectResult, SeparatingTestR
 
 use super::block::{Level, Report, Text};
 use super::effect::name;
-use super::figure::bars::{Bars, Fill};
+use super::figure::bars::{ALIAS, NAMED, OTHER, bars};
 use super::figure::lines::{Axis, Lines, Mark, Name, Series};
 use super::figure::scale::{Scale, span};
-use super::figure::{Chart, Figure, Quantity};
+use super::figure::{Figure, Quantity};
 use super::number::{integer, of_readings, p_value, quantity, shape_number, value_and_u};
 use super::table::{Cell, Column, Table, cells};
 use super::{trace as present, uniqueness};
@@ -211,7 +211,7 @@ fn curve(effect: &EffectResult) -> Figure {
         format!("curve-{}-{}", name.component, name.driver),
         format!("{} over {}", name.component, name.driver),
         caption,
-        Chart::Lines(lines),
+        lines,
     )
 }
 
@@ -246,7 +246,7 @@ fn convergence(trace: &TraceOutcome) -> Figure {
         "convergence",
         "Convergence of the search",
         "Held-out error after each addition. Later steps can exchange an added effect.",
-        Chart::Lines(lines),
+        lines,
     )
 }
 
@@ -254,20 +254,18 @@ fn convergence(trace: &TraceOutcome) -> Figure {
 fn ranking(competing: &[CompetingEffect], id: &str) -> Figure {
     let rows = competing.iter().map(|effect| {
         let fill = match (effect.named, effect.alias) {
-            (true, _) => Fill::Named,
-            (false, true) => Fill::Alias,
-            (false, false) => Fill::Other,
+            (true, _) => NAMED,
+            (false, true) => ALIAS,
+            (false, false) => OTHER,
         };
         (effect.id.clone(), effect.evidence, fill)
     });
+    let rows: Vec<_> = rows.collect();
+    let labels = [(NAMED, "selected"), (ALIAS, "indistinguishable"), (OTHER, "rejected")];
     Figure::new(
         format!("ranking-{id}"),
         format!("Competing explanations of {id}"),
         "Evidence together with the rest of the model: −ln P minus the complexity penalty.",
-        Chart::Bars(Bars {
-            quantity: Quantity::new("evidence, −ln P", ""),
-            rows: rows.collect(),
-            labels: vec![(Fill::Named, "selected"), (Fill::Alias, "indistinguishable"), (Fill::Other, "rejected")],
-        }),
+        bars(&Quantity::new("evidence, −ln P", ""), &rows, &labels),
     )
 }

@@ -13,9 +13,9 @@ use abbe::model::words::{counted, first_of};
 
 use super::block::{KeyFigure, Report, Text};
 use super::conformity::limits;
+use super::figure::Figure;
 use super::figure::lines::{Axis, Lines, Mark, Series};
 use super::figure::scale::{Scale, span};
-use super::figure::{Chart, Figure};
 use super::number::{quantity, unit, value_and_u};
 use super::statements;
 use super::table::{Cell, Table, cells, numbers, words};
@@ -385,7 +385,7 @@ fn over_time(machine: &MachineHistory, parameter: &ParameterHistory) -> Figure {
         format!("history-{}", parameter.id),
         parameter.id.clone(),
         parameter.meaning.clone(),
-        Chart::Lines(Lines::new(time_axis(machine), y, series)),
+        Lines::new(time_axis(machine), y, series),
     )
 }
 
@@ -410,6 +410,6 @@ fn control_chart(machine: &MachineHistory, parameter: &ParameterHistory) -> Figu
         format!("control-{}", parameter.id),
         format!("{}: control charts", parameter.id),
         parameter.meaning.clone(),
-        Chart::Lines(Lines::new(time_axis(machine), y, series)),
+        Lines::new(time_axis(machine), y, series),
     )
 }

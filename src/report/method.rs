@@ -6,8 +6,8 @@ use abbe::identify::results::MeasuredValue;
 use abbe::model::words::counted;
 
 use super::block::Report;
-use super::figure::bars::{Row, Values};
-use super::figure::{Chart, Figure, Quantity};
+use super::figure::bars::{self, Row};
+use super::figure::{Figure, Quantity};
 use super::fit::Figures;
 use super::number::{micrometres, unit, units};
 use super::quality::noise;
@@ -89,20 +89,13 @@ fn figures(result: &Comparison) -> Vec<Figure> {
     let value = |value: Option<f64>, u: Option<f64>| Some(MeasuredValue { value: value?, u: u? });
     let figure = |name: &str| {
         let own = result.errors.iter().filter(|row| row.unit == name);
-        let rows = own.map(|row| Row {
-            name: row.id.clone(),
-            before: value(row.value, row.u),
-            after: value(row.full_value, row.full_u),
-        });
+        let row = |row: &ComparisonRow| (row.id.clone(), [value(row.value, row.u), value(row.full_value, row.full_u)]);
+        let rows: Vec<Row> = own.map(row).collect();
         Figure::new(
             format!("errors-{name}"),
             format!("Errors by both methods, {}", unit(name)),
             "Whiskers: ± 2 u. An error that a method does not identify has no mark.",
-            Chart::Values(Values {
-                quantity: Quantity::new("value", name),
-                labels: [result.method.clone(), "full fit".to_string()],
-                rows: rows.collect(),
-            }),
+            bars::values(&Quantity::new("value", name), [&result.method, "full fit"], &rows),
         )
     };
     units(result.errors.iter().map(|row| row.unit.as_str())).into_iter().map(figure).collect()

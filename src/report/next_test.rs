@@ -8,8 +8,8 @@ use abbe::plan::next_test::NextTest;
 use abbe::plan::range::Shrinkage;
 
 use super::block::{Level, Report, Text};
-use super::figure::bars::{Bars, Fill};
-use super::figure::{Chart, Figure, Quantity};
+use super::figure::bars::{NAMED, OTHER, bars};
+use super::figure::{Figure, Quantity};
 use super::number::{capitalised, quantity, three_digits, unit};
 use super::quality::{efficiency, noise};
 use super::session;
@@ -98,16 +98,15 @@ fn proposed(report: &mut Report, found: &Improvement) {
 
 /// The figure of merit of the plan, and with each proposed test.
 fn figure(found: &Improvement, criterion: &str) -> Figure {
-    let mut rows = vec![("as planned".to_string(), found.before, Fill::Other)];
-    rows.extend(found.steps.iter().enumerate().map(|(k, step)| (format!("with {}", k + 1), step.after, Fill::Named)));
+    let mut rows = vec![("as planned".to_string(), found.before, OTHER)];
+    rows.extend(found.steps.iter().enumerate().map(|(k, step)| (format!("with {}", k + 1), step.after, NAMED)));
     // An error that is not identifiable has no uncertainty.
     rows.retain(|row| row.1.is_finite());
-    let quantity = Quantity::new(criterion, "");
     Figure::new(
         "next-test",
         "Plan with each proposed test",
         format!("{}. The tests are added one after another.", capitalised(criterion)),
-        Chart::Bars(Bars { quantity, rows, labels: Vec::new() }),
+        bars(&Quantity::new(criterion, ""), &rows, &[]),
     )
 }
 

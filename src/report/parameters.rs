@@ -8,8 +8,8 @@ use abbe::model::parameter_id::ParameterId;
 use abbe::model::words::counted;
 
 use super::block::{Report, Text};
-use super::figure::bars::{Row, Values};
-use super::figure::{Chart, Figure, Quantity};
+use super::figure::bars::{Row, values};
+use super::figure::{Figure, Quantity};
 use super::number::{places, unit, units, value_and_u};
 use super::quality::reservation;
 use super::table::{Cell, Table, cells, numbers};
@@ -161,17 +161,13 @@ fn beside(mut table: Table, parameters: &[&Estimate], before: Option<&[Estimate]
 }
 
 /// Figures with error bars of ± 2 u, one for each unit.
-fn figures(values: &[&Estimate], before: Option<&[Estimate]>, name: &str, title: &str) -> Vec<Figure> {
+fn figures(estimates: &[&Estimate], before: Option<&[Estimate]>, name: &str, title: &str) -> Vec<Figure> {
     let bar = |parameter: &Estimate| MeasuredValue { value: parameter.value, u: parameter.u };
     let same = |id: &str| before?.iter().find(|value| value.id == id).map(bar);
     let mut figures: Vec<Figure> = Vec::new();
-    for unit_name in units(values.iter().map(|value| value.unit.as_str())) {
-        let own = values.iter().filter(|parameter| parameter.unit == unit_name);
-        let row = |parameter: &&Estimate| Row {
-            name: parameter.id.clone(),
-            before: same(&parameter.id),
-            after: Some(bar(parameter)),
-        };
+    for unit_name in units(estimates.iter().map(|value| value.unit.as_str())) {
+        let own = estimates.iter().filter(|parameter| parameter.unit == unit_name);
+        let row = |parameter: &&Estimate| (parameter.id.clone(), [same(&parameter.id), Some(bar(parameter))]);
         let rows: Vec<Row> = own.map(row).collect();
         let parts = rows.len().div_ceil(MAX_ROWS);
         for (number, rows) in rows.chunks(MAX_ROWS).enumerate() {
@@ -180,11 +176,7 @@ fn figures(values: &[&Estimate], before: Option<&[Estimate]>, name: &str, title:
                 format!("{name}-{}-{}", unit_name.replace('/', "-per-"), number + 1),
                 format!("{title} in {}{part}", unit(unit_name)),
                 "Whiskers: ± 2 u.",
-                Chart::Values(Values {
-                    quantity: Quantity::new("value", unit_name),
-                    labels: ["before", "after"].map(str::to_string),
-                    rows: rows.to_vec(),
-                }),
+                values(&Quantity::new("value", unit_name), ["before", "after"], rows),
             ));
         }
     }

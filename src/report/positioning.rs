@@ -5,9 +5,9 @@ use abbe::identify::positioning::diagonal::{DiagonalKind, DiagonalTest, LargestO
 use abbe::identify::positioning::{Approach, COVERAGE, Contributions, Deviations, Position, PositioningTest};
 
 use super::block::{Report, Text};
+use super::figure;
 use super::figure::lines::{Axis, Lines, Mark, Series};
 use super::figure::scale::{Scale, span};
-use super::figure::{self, Chart};
 use super::number::unit;
 use super::table::{Cell, Table, cells, numbers, words};
 
@@ -183,7 +183,7 @@ fn positions(read: &Deviations, along: &str) -> Table {
 }
 
 /// Means and ±2s of both directions over the positions.
-fn plot(read: &Deviations, along: &str) -> Chart {
+fn plot(read: &Deviations, along: &str) -> Lines {
     let points = |direction: usize, deviations: f64| -> Vec<(f64, f64)> {
         let at = |position: &Position| {
             let one = [position.forward, position.backward][direction]?;
@@ -203,5 +203,5 @@ fn plot(read: &Deviations, along: &str) -> Chart {
     let x = Scale::of_axis(span(read.positions.iter().map(|position| position.at)), read.position_unit == "deg");
     let y = Scale::with_zero(span(series.iter().flat_map(|series| series.points.iter().map(|point| point.1))), 6);
     let x = Axis::new(along, &read.position_unit, x);
-    Chart::Lines(Lines::new(x, Axis::new("deviation", &read.unit, y), series))
+    Lines::new(x, Axis::new("deviation", &read.unit, y), series)
 }

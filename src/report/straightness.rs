@@ -4,9 +4,9 @@ use abbe::identify::figure::STRAIGHTNESS;
 use abbe::identify::straightness::{StraightnessPosition, StraightnessTest};
 
 use super::block::{Report, Text};
+use super::figure::Figure;
 use super::figure::lines::{Axis, Lines, Mark, Series};
 use super::figure::scale::{Scale, span};
-use super::figure::{Chart, Figure};
 use super::table::{Cell, Table, cells, numbers, words};
 
 /// The section of the figures of every test, if there is one.
@@ -47,6 +47,6 @@ fn plot(test: &StraightnessTest) -> Figure {
         format!("straightness-{}-{}", test.test, test.channel),
         format!("{}: {} straightness of {}", test.test, test.channel, test.axis),
         "Means of the readings less the line of least squares, and less the line through the end points.",
-        Chart::Lines(lines),
+        lines,
     )
 }

@@ -2,10 +2,10 @@
 
 use abbe::trace::validate::{Validation, ValidationResult};
 
-use crate::report::figure::bars::{Bars, Fill};
+use crate::report::figure::bars::{ALIAS, NAMED, OTHER, bars};
 use crate::report::figure::lines::{Axis, Lines, Mark, Series};
 use crate::report::figure::scale::{Scale, span};
-use crate::report::figure::{Chart, Figure, Quantity};
+use crate::report::figure::{Figure, Quantity};
 
 /// Maximum number of tests with figures of their own.
 const MAX_TESTS: usize = 12;
@@ -16,40 +16,36 @@ const MAX_POINTS: usize = 1500;
 /// Standard deviations of a 95 % interval.
 const INTERVAL: f64 = 1.96;
 
-fn bars(quantity: Quantity, rows: Vec<(String, f64, Fill)>) -> Chart {
-    Chart::Bars(Bars { quantity, rows, labels: Vec::new() })
-}
-
 /// Rms of the nominal machine, of the location errors and of the model.
 pub fn of_machines(result: &ValidationResult) -> Vec<Figure> {
     let model = &result.model;
     let mut rows = vec![
-        ("nominal machine".to_string(), result.nominal.rms_um, Fill::Other),
-        ("location errors".to_string(), result.locations.rms_um, Fill::Alias),
-        ("model".to_string(), model.residual.rms.rms_um, Fill::Named),
-        ("predicted".to_string(), model.residual.predicted_rms_um, Fill::Other),
+        ("nominal machine".to_string(), result.nominal.rms_um, OTHER),
+        ("location errors".to_string(), result.locations.rms_um, ALIAS),
+        ("model".to_string(), model.residual.rms.rms_um, NAMED),
+        ("predicted".to_string(), model.residual.predicted_rms_um, OTHER),
     ];
     rows.extend(
-        model.in_range.as_ref().map(|inside| ("model, inside its range".to_string(), inside.rms.rms_um, Fill::Named)),
+        model.in_range.as_ref().map(|inside| ("model, inside its range".to_string(), inside.rms.rms_um, NAMED)),
     );
     let caption = "With the set-up of this session estimated for each.";
-    vec![Figure::new("rms", "Residual of each machine", caption, bars(Quantity::new("rms", "um"), rows))]
+    vec![Figure::new("rms", "Residual of each machine", caption, bars(&Quantity::new("rms", "um"), &rows, &[]))]
 }
 
 /// Rms without each effect, less that of the whole model.
 pub fn of_effects(result: &ValidationResult) -> Vec<Figure> {
-    let mut rows: Vec<(String, f64, Fill)> = result
+    let mut rows: Vec<(String, f64, &str)> = result
         .without
         .iter()
         .map(|without| {
             let change = without.rms.rms_um - result.model.residual.rms.rms_um;
-            (without.effect.clone(), change, if change > 0.0 { Fill::Named } else { Fill::Other })
+            (without.effect.clone(), change, if change > 0.0 { NAMED } else { OTHER })
         })
         .collect();
     rows.sort_by(|a, b| b.1.total_cmp(&a.1));
     rows.truncate(MAX_BARS);
     let caption = "Increase of the rms without the effect. A negative bar: the effect does not hold here.";
-    let chart = bars(Quantity::new("increase of the rms", "um"), rows);
+    let chart = bars(&Quantity::new("increase of the rms", "um"), &rows, &[]);
     vec![Figure::new("effects", "Share of each effect", caption, chart)]
 }
 
@@ -71,9 +67,9 @@ fn coverage(validation: &Validation) -> Figure {
         100.0 * kept.iter().filter(|inside| **inside).count() as f64 / kept.len().max(1) as f64
     };
     let tests = validation.tests.iter().enumerate().take(MAX_BARS);
-    let rows = tests.map(|(test, name)| (name.clone(), share(test), Fill::Named)).collect();
+    let rows: Vec<_> = tests.map(|(test, name)| (name.clone(), share(test), NAMED)).collect();
     let caption = "Share of the scalar readings of each test.";
-    Figure::new("coverage", "Coverage of the 95 % intervals", caption, bars(Quantity::new("inside", "%"), rows))
+    Figure::new("coverage", "Coverage of the 95 % intervals", caption, bars(&Quantity::new("inside", "%"), &rows, &[]))
 }
 
 /// Residuals of a test: the nominal machine, the model, and the ends of the model's intervals.
@@ -101,6 +97,6 @@ fn residuals(validation: &Validation, test: usize) -> Figure {
         format!("residual-{name}"),
         format!("{name}: residuals"),
         "Nominal machine and model, each with its estimated set-up.",
-        Chart::Lines(Lines::new(x, y, series)),
+        Lines::new(x, y, series),
     )
 }

@@ -48,7 +48,7 @@ pub fn files(title: &str, summary: &str, parts: &[Part], layout: Layout) -> Resu
             Body::Figure(figure) => {
                 files.push((format!("figures/{}.pdf", figure.name), figure::pdf::file(figure)?));
                 files.push((format!("figures/{}.svg", figure.name), svg::untitled(figure).into_bytes()));
-                files.push((format!("figures/{}.csv", figure.name), csv::text(&figure.table())?));
+                files.push((format!("figures/{}.csv", figure.name), csv::text(&figure.chart.table)?));
             }
             _ => {}
         }

@@ -7,9 +7,8 @@ use maud::{Markup, html};
 
 use super::super::html::table;
 use super::{DRAWING, Order, clock, named, notes};
-use crate::report::figure::machine::MachineAxes;
 use crate::report::figure::svg::element;
-use crate::report::figure::{Chart, Figure};
+use crate::report::figure::{Figure, space};
 use crate::report::table::{Cell, Table, cells};
 
 /// The first page.
@@ -24,7 +23,7 @@ pub(super) fn overview(session: &Session, sheets: &[TestSheet], order: &Order) -
         "machine",
         "Machine",
         format!("in R with all axes at zero, seen along (1, 1, 1).{arrows}"),
-        Chart::Machine(MachineAxes::of(&session.machine, DRAWING)),
+        space::machine(&session.machine, DRAWING),
     );
     let (_, drawing) = element(&figure);
     let each = |of: fn(&TestSheet) -> Option<&'static str>| -> Vec<&'static str> {

@@ -7,9 +7,9 @@ use maud::{Markup, html};
 
 use super::super::html::table;
 use super::{DRAWING, Order, notes, positions};
-use crate::report::figure::set_up::SetUps;
+use crate::report::figure::Figure;
+use crate::report::figure::space::set_ups;
 use crate::report::figure::svg::element;
-use crate::report::figure::{Chart, Figure};
 use crate::report::number::{unit, with_minus_signs};
 use crate::report::table::{Cell, Table, cells, numbers};
 
@@ -22,7 +22,7 @@ pub(super) fn page(session: &Session, sheet: &TestSheet, order: &Order, [number,
         format!("set-up-{}", sheet.name),
         "Set-up",
         "in the reference frame R, seen along (1, 1, 1).",
-        Chart::SetUps(SetUps { panels: vec![sheet.path.clone()], per_row: 1, width: DRAWING }),
+        set_ups(std::slice::from_ref(&sheet.path), 1, DRAWING),
     );
     let (_, drawing) = element(&figure);
     let own = format!("test \"{}\":", sheet.name);

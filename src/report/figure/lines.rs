@@ -1,11 +1,10 @@
 //! Charts with two straight axes: lines, dots, stems, ranges and flags.
 
-use maud::{Markup, html};
 use serde_json::json;
 
-use super::scale::{Placed, Scale, coordinate, dots, polyline};
-use super::svg::{Drawing, WIDTH, legend, shortened};
-use super::{Kind, Quantity};
+use super::drawing::{Element, Place, WIDTH, legend, shortened};
+use super::scale::{Placed, Scale};
+use super::{Chart, Quantity};
 use crate::report::table::{Cell, Table, cells, numbers, words};
 
 /// Space of the tick labels and the label of the ordinate, SVG units.
@@ -58,10 +57,10 @@ impl Size {
         [x.scale.between(self.across()), y.scale.between(self.up())]
     }
 
-    /// Draws a legend below the frame. Returns it with the ordinate of its last line.
-    fn legend(self, entries: &[(String, String)]) -> (Markup, f64) {
+    /// A legend below the frame, with the ordinate of its last line.
+    fn legend(self, entries: &[(String, String)]) -> (Vec<Element>, f64) {
         match entries {
-            [] => (html! {}, self.height - 6.0),
+            [] => (Vec::new(), self.height - 6.0),
             _ => legend(entries, LEFT, self.height + 12.0, self.width - LEFT - RIGHT),
         }
     }
@@ -123,34 +122,26 @@ impl Series {
         Series { label: label.into(), class, mark, points, names: Vec::new(), source: None, test: None }
     }
 
-    /// Index of the traversal, if the script of the page redraws it.
-    pub(super) fn traversal(&self) -> Option<usize> {
-        self.source.map(|(traversal, _)| traversal)
-    }
-
     /// The points that have a name.
     fn named(&self) -> impl Iterator<Item = (&(f64, f64), &Name)> {
         self.points.iter().skip(self.points.len() - self.names.len()).zip(&self.names)
     }
 
-    fn path(&self, x: &Placed, y: &Placed) -> String {
-        let points = self.points.iter().map(|p| (x.at(p.0), y.at(p.1)));
-        let stroke = |x: f64, from: f64, to: f64| format!("M{} {}V{}", coordinate(x), coordinate(from), coordinate(to));
+    fn lines(&self, x: &Placed, y: &Placed) -> Vec<Vec<Place>> {
+        let at = |p: &(f64, f64)| (x.at(p.0), y.at(p.1));
         match self.mark {
-            Mark::Line | Mark::Flags => polyline(points),
-            Mark::Dots => dots(points),
+            Mark::Line | Mark::Flags => vec![self.points.iter().map(at).collect()],
+            Mark::Dots => self.points.iter().map(|point| vec![at(point)]).collect(),
             Mark::Stems(beside) => {
-                self.points.iter().map(|p| stroke(x.at(p.0 + beside), y.at(0.0), y.at(p.1))).collect()
+                let foot = |p: &(f64, f64)| (x.at(p.0 + beside), y.at(0.0));
+                self.points.iter().map(|point| vec![foot(point), (foot(point).0, at(point).1)]).collect()
             }
             // Half a pixel at each end makes a single reading visible.
-            Mark::Bars => self
-                .points
-                .chunks_exact(2)
-                .map(|pair| stroke(x.at(pair[0].0), y.at(pair[0].1) + 0.5, y.at(pair[1].1) - 0.5))
-                .collect(),
-            Mark::Vectors => {
-                self.points.chunks_exact(2).map(|pair| polyline(pair.iter().map(|p| (x.at(p.0), y.at(p.1))))).collect()
+            Mark::Bars => {
+                let bar = |from: Place, to: Place| vec![(from.0, from.1 + 0.5), (from.0, to.1 - 0.5)];
+                self.points.chunks_exact(2).map(|pair| bar(at(&pair[0]), at(&pair[1]))).collect()
             }
+            Mark::Vectors => self.points.chunks_exact(2).map(|pair| pair.iter().map(at).collect()).collect(),
         }
     }
 
@@ -177,35 +168,32 @@ impl Series {
         format!("{}{mark}", self.class)
     }
 
-    fn drawing(&self, x: &Placed, y: &Placed) -> Markup {
-        let name = |name: &Name, max: usize| shortened(&name.text, max);
-        html! {
-            @if self.mark == Mark::Flags {
-                @for (number, ((at, top), flag)) in self.named().enumerate() {
-                    @let frame_top = y.coordinates[1];
-                    @let (at, top, baseline) = (x.at(*at), y.at(*top), frame_top + 12.0 + 12.0 * (number % 3) as f64);
-                    @let (class, beside) = if at > x.coordinates[1] - LABEL_LIMIT { ("small right", -4.0) } else { ("small", 4.0) };
-                    path class="found-line"
-                        d=(polyline([(at, (top - 3.0).max(baseline + 2.0)), (at, baseline + 2.0)])) {}
-                    path class="found" d=(format!("M{} {}l-4 8h8z", coordinate(at), y.coordinates[0])) {}
-                    text class=(class) x=(coordinate(at + beside)) y=(coordinate(baseline)) {
-                        title { (flag.text) } (name(flag, 24))
-                    }
-                }
-            } @else {
-                path class=(self.classes()) data-run=[self.traversal()] data-column=[self.source.map(|s| s.1)]
-                    d=(self.path(x, y)) {}
-                @for ((left, top), dot) in self.named() {
-                    @let (left, top) = (x.at(*left), y.at(*top));
-                    circle class=(format!("dot-{}", self.class)) cx=(coordinate(left)) cy=(coordinate(top)) r="3.4" {
-                        title { (dot.text) ": " (dot.note) }
-                    }
-                    @if dot.shown {
-                        text class="small" x=(coordinate(left + 6.0)) y=(coordinate(top - 7.0)) { (name(dot, 26)) }
-                    }
-                }
+    fn elements(&self, x: &Placed, y: &Placed) -> Vec<Element> {
+        let mut elements = Vec::new();
+        if self.mark == Mark::Flags {
+            for (number, ((at, top), flag)) in self.named().enumerate() {
+                let [bottom, frame_top] = y.coordinates;
+                let (at, top, baseline) = (x.at(*at), y.at(*top), frame_top + 12.0 + 12.0 * (number % 3) as f64);
+                let is_right = at > x.coordinates[1] - LABEL_LIMIT;
+                let (class, beside) = if is_right { ("small right", -4.0) } else { ("small", 4.0) };
+                let pole = [(at, (top - 3.0).max(baseline + 2.0)), (at, baseline + 2.0)];
+                elements.push(Element::line("found-line", pole));
+                elements
+                    .push(Element::line("found", [(at, bottom), (at - 4.0, bottom + 8.0), (at + 4.0, bottom + 8.0)]));
+                let name = shortened(&flag.text, 24);
+                elements.push(Element::text(class, (at + beside, baseline), name).titled(&flag.text));
             }
+            return elements;
         }
+        elements.push(Element::lines(self.classes(), self.lines(x, y)).of(self.source));
+        for ((at, top), dot) in self.named() {
+            let (at, top) = (x.at(*at), y.at(*top));
+            let title = format!("{}: {}", dot.text, dot.note);
+            elements.push(Element::circle(format!("dot-{}", self.class), (at, top), 3.4).titled(title));
+            let name = dot.shown.then(|| shortened(&dot.text, 26));
+            elements.extend(name.map(|name| Element::text("small", (at + 6.0, top - 7.0), name)));
+        }
+        elements
     }
 }
 
@@ -264,6 +252,20 @@ impl Lines {
     pub fn sized(self, size: Size) -> Lines {
         Lines { size, ..self }
     }
+
+    fn table(&self) -> Table {
+        let mut table = table(&self.series, &self.x.quantity, &self.y.quantity);
+        let heading = self.x.quantity.heading();
+        let column = table.columns.iter().position(|column| column.heading == heading);
+        if let (Some(words), Some(column)) = (self.x.scale.words, column) {
+            for row in &mut table.rows {
+                if let Some(Cell::Number(value, _)) = row.get(column) {
+                    row[column] = words(*value).into();
+                }
+            }
+        }
+        table
+    }
 }
 
 /// Entries of the legend: CSS classes and label, in the order of the first series of each.
@@ -284,7 +286,7 @@ pub(super) fn table(series: &[Series], x: &Quantity, y: &Quantity) -> Table {
         let names = names.chain(series.names.iter().map(|name| name.text.as_str()));
         series.points.iter().zip(names).map(|((x, y), name)| {
             let test = series.test.as_ref().map_or("", |(_, name)| name);
-            let traversal = series.traversal().map_or(String::new(), |traversal| (traversal + 1).to_string());
+            let traversal = series.source.map_or(String::new(), |(traversal, _)| (traversal + 1).to_string());
             cells![test, &series.label, traversal, Cell::exact(*x), Cell::exact(*y), name]
         })
     });
@@ -293,57 +295,41 @@ pub(super) fn table(series: &[Series], x: &Quantity, y: &Quantity) -> Table {
     Table::new(columns, rows).without_empty_columns()
 }
 
-/// Draws the frame, the grid, the tick labels and the labels of the axes.
-pub(super) fn frame(x: &Placed, y: &Placed, [x_label, y_label]: [String; 2]) -> Markup {
+/// The grid, the tick labels, the frame and the labels of the axes.
+pub(super) fn frame(x: &Placed, y: &Placed, [x_label, y_label]: [String; 2]) -> Vec<Element> {
     let ([left, right], [bottom, top]) = (x.coordinates, y.coordinates);
-    html! {
-        @for (at, label) in y.ticks() {
-            path class="grid" d=(format!("M{left} {}H{right}", coordinate(at))) {}
-            text class="small soft right tick" x=(left - 6.0) y=(coordinate(at + 4.0)) { (label) }
-        }
-        @for (at, label) in x.ticks() {
-            @let at = coordinate(at);
-            path class="grid" d=(format!("M{at} {bottom}V{top}")) {}
-            text class="small soft middle" x=(at) y=(bottom + 16.0) { (label) }
-        }
-        rect class="frame" x=(left) y=(top) width=(right - left) height=(bottom - top) {}
-        text class="middle" x=((left + right) / 2.0) y=(bottom + 36.0) { (x_label) }
-        text class="middle" transform=(format!("translate(14 {}) rotate(-90)", (bottom + top) / 2.0)) { (y_label) }
+    let mut elements = Vec::new();
+    for (at, label) in y.ticks() {
+        elements.push(Element::line("grid", [(left, at), (right, at)]));
+        elements.push(Element::text("small soft right tick", (left - 6.0, at + 4.0), label));
     }
+    for (at, label) in x.ticks() {
+        elements.push(Element::line("grid", [(at, bottom), (at, top)]));
+        elements.push(Element::text("small soft middle", (at, bottom + 16.0), label));
+    }
+    elements.extend([
+        Element::rectangle("frame", (left, top), [right - left, bottom - top]),
+        Element::text("middle", ((left + right) / 2.0, bottom + 36.0), x_label),
+        Element::upwards("middle", (14.0, (bottom + top) / 2.0), y_label),
+    ]);
+    elements
 }
 
-impl Kind for Lines {
-    fn drawing(&self) -> Drawing {
-        let [x, y] = self.size.placed(&self.x, &self.y);
-        let (keys, bottom) = self.size.legend(&entries(&self.series));
-        let inner = html! {
-            (frame(&x, &y, [self.x.quantity.label(), self.y.quantity.label()]))
-            @for series in &self.series { (series.drawing(&x, &y)) }
-            (keys)
-        };
-        let interaction = self.live.as_ref().map(|live| {
-            let um = if live.scaled { y.scale.step } else { 1.0 };
-            json!({
-                "kind": "line", "test": live.test, "column": live.column, "abscissa": live.abscissa,
-                "x0": x.at(0.0), "kx": x.per_unit(), "y0": y.at(0.0), "px": y.per_unit().abs() * um, "um": um,
-                "scaled": live.scaled,
-            })
-            .to_string()
-        });
-        Drawing { size: [self.size.width, bottom + 10.0], inner, interaction }
-    }
-
-    fn table(&self) -> Table {
-        let mut table = table(&self.series, &self.x.quantity, &self.y.quantity);
-        let heading = self.x.quantity.heading();
-        let column = table.columns.iter().position(|column| column.heading == heading);
-        if let (Some(words), Some(column)) = (self.x.scale.words, column) {
-            for row in &mut table.rows {
-                if let Some(Cell::Number(value, _)) = row.get(column) {
-                    row[column] = words(*value).into();
-                }
-            }
-        }
-        table
+impl From<Lines> for Chart {
+    fn from(lines: Lines) -> Chart {
+        let Lines { x: across, y: up, series, size, live } = &lines;
+        let [x, y] = size.placed(across, up);
+        let (keys, bottom) = size.legend(&entries(series));
+        let mut elements = frame(&x, &y, [across.quantity.label(), up.quantity.label()]);
+        elements.extend(series.iter().flat_map(|series| series.elements(&x, &y)));
+        elements.extend(keys);
+        let chart = Chart::new("lines", [size.width, bottom + 10.0], elements, lines.table());
+        let Some(live) = live else { return chart };
+        let um = if live.scaled { y.scale.step } else { 1.0 };
+        chart.live(&json!({
+            "kind": "line", "test": live.test, "column": live.column, "abscissa": live.abscissa,
+            "x0": x.at(0.0), "kx": x.per_unit(), "y0": y.at(0.0), "px": y.per_unit().abs() * um, "um": um,
+            "scaled": live.scaled,
+        }))
     }
 }

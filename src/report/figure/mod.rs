@@ -1,27 +1,27 @@
-//! Figures as data: what a chart shows, with its title, caption and units. Nothing here draws.
+//! Figures: a chart with its title and caption, drawn as a list of elements, and its data as one tidy table.
 //!
-//! One file per kind of chart ([`lines`], [`bars`], [`bubbles`], [`matrix`], [`polar`], [`chain`], [`machine`],
-//! [`set_up`]) holds the data of the kind, its
-//! table and its drawing. Printers: [`svg`] draws a figure inside the report or as a file; `png` (feature `png`) draws
-//! that file as pixels; [`pdf`] draws it for LaTeX; [`Figure::table`] gives the data as one tidy table, which
-//! [`crate::printers::csv`] writes. A further kind is one file and one variant of [`Chart`].
+//! One file for each kind of chart ([`lines`], [`bars`], [`bubbles`], [`matrix`], [`polar`], [`chain`], [`space`]) makes a
+//! [`Chart`] of what it shows. Printers: [`svg`] prints the elements of a [`drawing`] inside the report or as a file; `png`
+//! (feature `png`) draws that file as pixels; [`pdf`] prints them for LaTeX; [`crate::printers::csv`] writes the table. A
+//! further kind is one file.
 
 pub mod bars;
 pub mod bubbles;
 pub mod chain;
+pub mod drawing;
 pub mod lines;
-pub mod machine;
 pub mod matrix;
 pub mod pdf;
 #[cfg(feature = "png")]
 pub mod png;
 pub mod polar;
 pub mod scale;
-pub mod set_up;
+pub mod space;
 pub mod svg;
 
 use super::number;
 use super::table::{Cell, Column, Table};
+use drawing::{Drawing, Element};
 
 /// Most words of a column that the figure in words names.
 const MAX_LISTED: usize = 12;
@@ -39,68 +39,44 @@ pub struct Figure {
     pub chart: Chart,
 }
 
-/// The kinds of charts.
+/// What a figure shows.
 #[derive(Clone, Debug)]
-pub enum Chart {
-    /// Series over two straight axes.
-    Lines(lines::Lines),
-    /// Values with error bars, one row per name.
-    Values(bars::Values),
-    /// Bars from zero, one row per name.
-    Bars(bars::Bars),
-    /// Two sizes over two straight axes of equal scale.
-    Bubbles(bubbles::Bubbles),
-    /// A symmetric matrix, such as a correlation.
-    Matrix(matrix::Matrix),
-    /// Deviations about a nominal circle.
-    Polar(polar::Polar),
-    /// Several deviations about nominal circles at one scale.
-    Panels(polar::Panels),
-    /// The kinematic chain of a machine.
-    Chain(chain::Chain),
-    /// A machine with its axes and bodies.
-    Machine(machine::MachineAxes),
-    /// The set-ups of tests in space.
-    SetUps(set_up::SetUps),
+pub struct Chart {
+    /// The kind of chart.
+    pub kind: &'static str,
+    /// The drawing.
+    pub drawing: Drawing,
+    /// The data in full precision: one row per mark, the unit of a column in its heading.
+    pub table: Table,
 }
 
-/// What a kind of chart provides.
-trait Kind {
-    /// The drawing.
-    fn drawing(&self) -> svg::Drawing;
-    /// The data in full precision: one row per mark, the unit of a column in its heading.
-    fn table(&self) -> Table;
+impl Chart {
+    /// A static chart of this size.
+    fn new(kind: &'static str, size: [f64; 2], elements: Vec<Element>, table: Table) -> Chart {
+        Chart { kind, drawing: Drawing { size, elements, interaction: None }, table }
+    }
+
+    /// With data for the script of the page.
+    fn live(mut self, data: &serde_json::Value) -> Chart {
+        self.drawing.interaction = Some(data.to_string());
+        self
+    }
 }
 
 impl Figure {
     /// A figure. Its file name is derived from `name`.
-    pub fn new(name: impl AsRef<str>, title: impl Into<String>, caption: impl Into<String>, chart: Chart) -> Figure {
-        Figure { name: file_name(name.as_ref()), title: title.into(), caption: caption.into(), chart }
-    }
-
-    fn kind(&self) -> &dyn Kind {
-        match &self.chart {
-            Chart::Lines(kind) => kind,
-            Chart::Values(kind) => kind,
-            Chart::Bars(kind) => kind,
-            Chart::Bubbles(kind) => kind,
-            Chart::Matrix(kind) => kind,
-            Chart::Polar(kind) => kind,
-            Chart::Panels(kind) => kind,
-            Chart::Chain(kind) => kind,
-            Chart::Machine(kind) => kind,
-            Chart::SetUps(kind) => kind,
-        }
-    }
-
-    /// The data as one tidy table, in full precision.
-    pub fn table(&self) -> Table {
-        self.kind().table()
+    pub fn new(
+        name: impl AsRef<str>,
+        title: impl Into<String>,
+        caption: impl Into<String>,
+        chart: impl Into<Chart>,
+    ) -> Figure {
+        Figure { name: file_name(name.as_ref()), title: title.into(), caption: caption.into(), chart: chart.into() }
     }
 
     /// The figure in words, for readers who cannot see it: its title, and what each column of its data spans.
     pub fn alternative(&self) -> String {
-        let table = self.table();
+        let table = &self.chart.table;
         let spans = table.columns.iter().enumerate().map(|(column, Column { heading, .. })| {
             let numbers = table.rows.iter().filter_map(|row| match row.get(column) {
                 Some(Cell::Number(value, _)) => Some(*value),
@@ -179,9 +155,9 @@ mod tests {
         let [x, y] = axes;
         let series = ["before", "after"]
             .map(|label| Series::new(label, "before", Mark::Stems(0.2), vec![(-90.0, 0.125), (45.0, -1.0 / 3.0)]));
-        let figure = Figure::new("a/b", "Title", "", Chart::Lines(Lines::new(x, y, series.to_vec())));
+        let figure = Figure::new("a/b", "Title", "", Lines::new(x, y, series.to_vec()));
         assert_eq!(figure.name, "a-b");
-        let text = String::from_utf8(crate::printers::csv::text(&figure.table()).unwrap()).unwrap();
+        let text = String::from_utf8(crate::printers::csv::text(&figure.chart.table).unwrap()).unwrap();
         let rows: Vec<&str> = text.lines().collect();
         assert_eq!(rows[0], "series,C_deg,length_of_the_residual_um_per_arcsec");
         assert_eq!(rows[1..3], ["before,-90,0.125", "before,45,-0.3333333333333333"]);

@@ -120,33 +120,6 @@ pub fn span(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
 }
 
-/// Formats a coordinate to a tenth of a pixel, without negative zero.
-pub fn coordinate(value: f64) -> String {
-    let rounded = (value * 10.0).round() / 10.0;
-    if rounded == 0.0 { "0".to_string() } else { format!("{rounded}") }
-}
-
-/// SVG path through points.
-pub fn polyline(points: impl IntoIterator<Item = (f64, f64)>) -> String {
-    let mut path = String::new();
-    for (x, y) in points {
-        path.push(if path.is_empty() { 'M' } else { 'L' });
-        path.push_str(&coordinate(x));
-        path.push(' ');
-        path.push_str(&coordinate(y));
-    }
-    path
-}
-
-/// SVG path with a dot at each point: a stroke of zero length with a round cap.
-pub fn dots(points: impl IntoIterator<Item = (f64, f64)>) -> String {
-    let mut path = String::new();
-    for (x, y) in points {
-        path.push_str(&format!("M{} {}h0", coordinate(x), coordinate(y)));
-    }
-    path
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

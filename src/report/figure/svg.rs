@@ -6,50 +6,30 @@
 
 use maud::{Markup, PreEscaped, html};
 
-use super::{Figure, scale};
-
-/// Width of a drawing with straight axes, in SVG units. Two such drawings stand beside one another at 1,280 px, and one
-/// fills a narrow screen with legible text.
-pub const WIDTH: f64 = 500.0;
+use super::Figure;
+use super::drawing::{Drawing, Element, Place, Shape, WIDTH, wrapped};
 
 /// Style sheet of all drawings.
 pub const STYLE: &str = include_str!("plot.css");
 
-/// The drawing of a chart.
-pub struct Drawing {
-    /// Width and height, SVG units.
-    pub size: [f64; 2],
-    /// Contents of the `svg` element.
-    pub inner: Markup,
-    /// Data for the script of the page, as JSON. `None` for a static drawing.
-    pub interaction: Option<String>,
-}
-
-impl Drawing {
-    /// A static drawing.
-    pub fn new(size: [f64; 2], inner: Markup) -> Drawing {
-        Drawing { size, inner, interaction: None }
-    }
-}
-
 /// The `figure` element with its width. The page contains the style sheet.
 pub fn element(figure: &Figure) -> (f64, Markup) {
-    let Drawing { size: [width, height], inner, interaction } = figure.kind().drawing();
+    let Drawing { size: [width, height], elements, interaction } = &figure.chart.drawing;
     let markup = html! {
-        figure class=[(width >= WIDTH).then_some("wide")] style=(format!("--width:{width}")) {
+        figure class=[(*width >= WIDTH).then_some("wide")] style=(format!("--width:{width}")) {
             figcaption { b { (figure.title) } " " (figure.caption) }
             svg xmlns="http://www.w3.org/2000/svg" class="plot" viewBox=(format!("0 0 {width} {height}"))
                 role="img" aria-label=(figure.alternative()) data-interaction=[interaction] {
-                (inner)
+                @for one in elements { (printed(one)) }
             }
         }
     };
-    (width, markup)
+    (*width, markup)
 }
 
 /// A separate SVG file on a white background, with the title above the drawing.
 pub fn file(figure: &Figure) -> String {
-    let width = figure.kind().drawing().size[0];
+    let width = figure.chart.drawing.size[0];
     document(figure, &wrapped(&figure.title, ((width - 16.0) / 7.4) as usize))
 }
 
@@ -59,7 +39,7 @@ pub fn untitled(figure: &Figure) -> String {
 }
 
 fn document(figure: &Figure, title: &[String]) -> String {
-    let Drawing { size: [width, height], inner, .. } = figure.kind().drawing();
+    let Drawing { size: [width, height], elements, .. } = &figure.chart.drawing;
     let above = if title.is_empty() { 0.0 } else { 12.0 + 18.0 * title.len() as f64 };
     let all = height + above;
     html! {
@@ -70,10 +50,63 @@ fn document(figure: &Figure, title: &[String]) -> String {
             @for (number, line) in title.iter().enumerate() {
                 text class="title" x="8" y=(18.0 * (number as f64 + 1.0) - above) { (line) }
             }
-            (inner)
+            @for one in elements { (printed(one)) }
         }
     }
     .into_string()
+}
+
+/// An element with its title and what the script of the page reads.
+fn printed(element: &Element) -> Markup {
+    let class = Some(&element.class).filter(|class| !class.is_empty());
+    let (run, column) = element.source.unzip();
+    let title = html! { @if !element.title.is_empty() { title { (element.title) } } };
+    let number = coordinate;
+    match &element.shape {
+        Shape::Lines(lines) => html! {
+            path class=[class] data-run=[run] data-column=[column] d=(path(lines)) { (title) }
+        },
+        Shape::Rectangle((x, y), [width, height], radius) => html! {
+            rect class=[class] data-run=[run] x=(number(*x)) y=(number(*y)) width=(number(*width))
+                height=(number(*height)) rx=[(*radius > 0.0).then_some(radius)] { (title) }
+        },
+        Shape::Circle((x, y), radius) => html! {
+            circle class=[class] data-run=[run] cx=(number(*x)) cy=(number(*y)) r=(number(*radius)) { (title) }
+        },
+        Shape::Text { at: (x, y), words, upwards, size } => {
+            let style = size.map(|size| format!("font-size:{}px", number(size)));
+            let turned = upwards.then(|| format!("translate({} {}) rotate(-90)", number(*x), number(*y)));
+            let [x, y] = [x, y].map(|place| (!upwards).then(|| number(*place)));
+            html! { text class=[class] style=[style] x=[x] y=[y] transform=[turned] { (title) (words) } }
+        }
+        Shape::Group((x, y), elements) => {
+            let moved = (*x != 0.0 || *y != 0.0).then(|| format!("translate({x} {y})"));
+            html! { g transform=[moved] { (title) @for one in elements { (printed(one)) } } }
+        }
+    }
+}
+
+/// A coordinate to a tenth of a pixel, without negative zero.
+fn coordinate(value: f64) -> String {
+    let rounded = (value * 10.0).round() / 10.0;
+    if rounded == 0.0 { "0".to_string() } else { format!("{rounded}") }
+}
+
+/// The path of lines; of a dot, a stroke of zero length with a round cap.
+fn path(lines: &[Vec<Place>]) -> String {
+    let mut path = String::new();
+    for line in lines {
+        for (number, (x, y)) in line.iter().enumerate() {
+            path.push(if number == 0 { 'M' } else { 'L' });
+            path.push_str(&coordinate(*x));
+            path.push(' ');
+            path.push_str(&coordinate(*y));
+        }
+        if line.len() == 1 {
+            path.push_str("h0");
+        }
+    }
+    path
 }
 
 /// Replaces CSS variables by the light colours, because many SVG programs do not support variables.
@@ -116,80 +149,3 @@ pub const DARK: [(&str, &str); 12] = [
     ("third", "#e59ad2"),
     ("fourth", "#f0e442"),
 ];
-
-/// Wraps text into lines of at most `max` characters. A longer word stays whole.
-pub fn wrapped(text: &str, max: usize) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
-    for word in text.split_whitespace() {
-        match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= max => {
-                line.push(' ');
-                line.push_str(word);
-            }
-            _ => lines.push(word.to_string()),
-        }
-    }
-    lines
-}
-
-/// Shortens text to at most `max` characters, with an ellipsis.
-pub fn shortened(text: &str, max: usize) -> String {
-    if text.chars().count() <= max {
-        return text.to_string();
-    }
-    let kept: String = text.chars().take(max.saturating_sub(1)).collect();
-    format!("{kept}…")
-}
-
-/// Greatest width of a letter of a drawing, SVG units: widths of text are estimated generously.
-const LETTER: f64 = 7.8;
-/// Height of a letter above its line.
-const ASCENT: f64 = 11.0;
-
-/// Where a label beside a point starts, so that all of it is within a drawing of this size.
-pub fn label_place((x, y): (f64, f64), text: &str, [width, height]: [f64; 2]) -> (f64, f64) {
-    let last = width - LETTER * text.chars().count() as f64;
-    (x.min(last).max(0.0), y.min(height).max(ASCENT))
-}
-
-/// Draws a legend from the left, in as many lines as needed. Returns it with the ordinate of its last line. Text widths
-/// are estimated generously.
-pub fn legend<S: AsRef<str>>(entries: &[(S, String)], x: f64, y: f64, width: f64) -> (Markup, f64) {
-    let mut placed = Vec::new();
-    let (mut left, mut baseline) = (x, y);
-    for (class, label) in entries {
-        let class = class.as_ref();
-        let needed = 26.0 + LETTER * label.chars().count() as f64;
-        if left > x && left + needed > x + width {
-            left = x;
-            baseline += 17.0;
-        }
-        placed.push((left, baseline, class, label));
-        // A filled key needs more space after it than a line.
-        left += needed + if class.starts_with("key-") { 12.0 } else { 4.0 };
-    }
-    let markup = html! {
-        @for (left, baseline, class, label) in &placed {
-            @if class.starts_with("key-") {
-                (key(class, *left + 9.0, *baseline - 4.0))
-            } @else if class.contains("dots") {
-                path class=(class) d=(scale::dots([2.0, 9.0, 16.0].map(|x| (left + x, baseline - 4.0)))) {}
-            } @else {
-                path class=(class) d=(format!("M{left} {}h18", baseline - 4.0)) {}
-            }
-            text x=(left + 23.0) y=(baseline) { (label) }
-        }
-    };
-    (markup, baseline)
-}
-
-/// A filled key of a legend: the symbols of start and end, or the fill of a bar.
-fn key(class: &str, x: f64, y: f64) -> Markup {
-    html! {
-        @match class {
-            "key-start" => { circle class="start" cx=(x) cy=(y) r="4" {} }
-            "key-end" => { rect class="end" x=(x - 3.5) y=(y - 3.5) width="7" height="7" {} }
-            other => { rect class=(other) x=(x - 8.0) y=(y - 5.0) width="16" height="10" {} }
-        }
-    }
-}

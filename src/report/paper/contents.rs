@@ -11,8 +11,8 @@ use abbe::trace::SessionFit;
 
 use super::{Part, Subject};
 use crate::report::block::{Formula, Report};
-use crate::report::figure::bars::{Bars, Fill};
-use crate::report::figure::{Chart, Figure, Quantity, set_up, svg};
+use crate::report::figure::bars::{NAMED, bars};
+use crate::report::figure::{Figure, Quantity, drawing, space};
 use crate::report::number::{three_digits, unit, with_symbols};
 use crate::report::parameters;
 use crate::report::plan::{analysis as plan, indices};
@@ -53,10 +53,9 @@ pub fn set_up(study: &Study) -> Part {
     if all > MAX_SET_UPS {
         caption.push_str(&format!(" The first {MAX_SET_UPS} of {all} tests."));
     }
-    let panels = set_up::SetUps { panels: set_ups, per_row: 2, width: svg::WIDTH };
     report.figures([
         session::chain(problem),
-        Figure::new("set-up", "Set-up of each test", caption, Chart::SetUps(panels)),
+        Figure::new("set-up", "Set-up of each test", caption, space::set_ups(&set_ups, 2, drawing::WIDTH)),
     ]);
     let rows = study.analysis.tests.iter().map(|test| {
         let minutes = test.moving_min.map_or("–".to_string(), |min| format!("{min:.1}"));
@@ -154,20 +153,20 @@ fn ranks(structure: &Structure) -> Table {
 
 fn singular_values(structure: &Structure) -> Option<Figure> {
     const MAX: usize = 40;
-    let rows: Vec<(String, f64, Fill)> = structure
+    let rows: Vec<(String, f64, &str)> = structure
         .singular_values
         .iter()
         .enumerate()
         .filter(|(_, value)| **value > 0.0)
         .skip(structure.singular_values.len().saturating_sub(MAX))
-        .map(|(k, value)| (format!("σ{}", k + 1), value.log10(), Fill::Named))
+        .map(|(k, value)| (format!("σ{}", k + 1), value.log10(), NAMED))
         .collect();
     (!rows.is_empty()).then(|| {
         Figure::new(
             "singular-values",
             "Singular values of readings and priors",
             "Logarithm to base 10. Values below 0 are not identifiable. The smallest 40 at most.",
-            Chart::Bars(Bars { quantity: Quantity::new("lg σ", ""), rows, labels: Vec::new() }),
+            bars(&Quantity::new("lg σ", ""), &rows, &[]),
         )
     })
 }

@@ -14,8 +14,8 @@ use super::{
 use crate::report::block::{KeyFigure, Level, Report, Text};
 use crate::report::commands::{Commands, SIMULATED};
 use crate::report::confounded::{BY_PRIOR, by_prior};
-use crate::report::figure::bars::{Bars, Fill};
-use crate::report::figure::{Chart, Figure, Quantity};
+use crate::report::figure::bars::{ALIAS, NAMED, bars};
+use crate::report::figure::{Figure, Quantity};
 use crate::report::number::{integer, of_readings, three_digits, unit, units, with_symbols};
 use crate::report::quality::noise;
 use crate::report::session::{correlation_map, model};
@@ -162,9 +162,8 @@ pub fn correlations(report: &mut Report, analysis: &PlanAnalysis) {
          error is known.",
     );
     if count > 1 {
-        let ids = analysis.correlation.ids[..count].to_vec();
-        let rows = analysis.correlation.matrix[..count].iter().map(|row| row[..count].to_vec()).collect();
-        report.figures([correlation_map(ids, rows)]);
+        let rows: Vec<_> = analysis.correlation.matrix[..count].iter().map(|row| row[..count].to_vec()).collect();
+        report.figures([correlation_map(&analysis.correlation.ids[..count], &rows)]);
     }
     match correlation(analysis) {
         Some(table) => report.detail(table.named("correlation-matrix")),
@@ -180,17 +179,15 @@ fn figures(errors: &[ErrorAnalysis]) -> Vec<Figure> {
         let own = errors.iter().filter(|error| error.unit == name);
         let rows = own.filter_map(|error| Some((error, error.u?))).flat_map(|(error, u)| {
             let known = error.conditional_u.unwrap_or(u);
-            [(error.id.clone(), u, Fill::Named), (format!("{}, conditional", error.id), known, Fill::Alias)]
+            [(error.id.clone(), u, NAMED), (format!("{}, conditional", error.id), known, ALIAS)]
         });
+        let rows: Vec<_> = rows.take(2 * MAX_ROWS).collect();
+        let labels = [(NAMED, "predicted"), (ALIAS, "conditional")];
         Figure::new(
             format!("uncertainty-{}", name.replace('/', "-per-")),
             format!("Predicted standard uncertainty, {}", unit(name)),
             "Conditional: if all other errors were known.",
-            Chart::Bars(Bars {
-                quantity: Quantity::new("u (k\u{a0}=\u{a0}1)", name),
-                rows: rows.take(2 * MAX_ROWS).collect(),
-                labels: vec![(Fill::Named, "predicted"), (Fill::Alias, "conditional")],
-            }),
+            bars(&Quantity::new("u (k\u{a0}=\u{a0}1)", name), &rows, &labels),
         )
     };
     units.map(figure).collect()

@@ -11,12 +11,12 @@ use abbe::model::words::counted;
 
 use super::decimate;
 use super::plots::{MAX_TESTS, SessionPlots};
-use crate::report::figure::bars::{Bars, Fill};
+use crate::report::figure::bars::{NAMED, bars};
+use crate::report::figure::drawing::shortened;
 use crate::report::figure::lines::{Axis, Lines, Mark, Name, Series};
-use crate::report::figure::polar::Panels;
+use crate::report::figure::polar::panels;
 use crate::report::figure::scale::{Scale, span, text};
-use crate::report::figure::svg::shortened;
-use crate::report::figure::{Chart, Figure, Quantity};
+use crate::report::figure::{Figure, Quantity};
 use crate::report::number::{unit, units};
 
 /// Intervals of a plot over time.
@@ -61,7 +61,7 @@ pub fn histogram(session: &SessionPlots<'_>, models: [&str; 2]) -> Figure {
         vec![Series::new(models[0], "before", Mark::Line, before), Series::new(models[1], "after", Mark::Line, after)],
     );
     let caption = "Absolute residual of all tests.";
-    Figure::new("residual-lengths", "Distribution of the residual", caption, Chart::Lines(lines))
+    Figure::new("residual-lengths", "Distribution of the residual", caption, lines)
 }
 
 /// Residuals of the session over time. Without time: in the order of the readings.
@@ -109,7 +109,7 @@ pub fn over_time(session: &SessionPlots<'_>) -> Figure {
         format!("Residual against {abscissa}"),
         "All tests, minimum to maximum of each interval. Before: red. After: blue. The test switches of the traces \
          apply here too.",
-        Chart::Lines(lines),
+        lines,
     )
 }
 
@@ -161,7 +161,7 @@ pub fn spectrum_plot(spectrum: &Spectrum, maximum: f64, effects: &[Effect]) -> F
         format!("spectrum-{}-{}", spectrum.of, spectrum.over),
         format!("{}: spectrum of the residual over {}", spectrum.of, spectrum.over),
         "Amplitude of a sine and cosine of each order, fitted separately.",
-        Chart::Lines(lines),
+        lines,
     )
 }
 
@@ -205,8 +205,8 @@ fn pose_sensitivities(found: &[Sensitivity]) -> Vec<Figure> {
         .into_iter()
         .map(|name| {
             let own = found.iter().filter(|error| error.unit == name);
-            let mut rows: Vec<(String, f64, Fill)> =
-                own.map(|error| (error.id.clone(), error.values[0], Fill::Named)).collect();
+            let mut rows: Vec<(String, f64, &str)> =
+                own.map(|error| (error.id.clone(), error.values[0], NAMED)).collect();
             rows.sort_by(|a, b| b.1.total_cmp(&a.1));
             let omitted = rows.len().saturating_sub(MAX);
             rows.truncate(MAX);
@@ -219,7 +219,7 @@ fn pose_sensitivities(found: &[Sensitivity]) -> Vec<Figure> {
                 format!("sensitivity-{}", name.replace('/', "-per-")),
                 format!("Sensitivity to errors in {}", unit(name)),
                 caption,
-                Chart::Bars(Bars { quantity, rows, labels: Vec::new() }),
+                bars(&quantity, &rows, &[]),
             )
         })
         .collect()
@@ -243,16 +243,14 @@ fn polar_sensitivities(test: &TestSensitivities, columns: &[Sensitivity], um: f6
         let points = test.way.values.iter().zip(&column.values).map(|(angle, value)| (*angle, value * amount));
         Some(Series::new(format!("{} = {label}", column.id), "forward", Mark::Line, points.collect()))
     };
+    let [angle, deviation] =
+        [(test.way.name.as_str(), "deg"), ("deviation", "um")].map(|(of, unit)| Quantity::new(of, unit));
+    let series: Vec<Series> = columns.iter().filter_map(panel).collect();
     Figure::new(
         format!("patterns-{}", test.test),
         format!("{}: deviation caused by single errors", test.test),
         format!("{} µm per division, first order. Errors without influence on the test are omitted.", text(um, um)),
-        Chart::Panels(Panels {
-            angle: Quantity::new(&test.way.name, "deg"),
-            deviation: Quantity::new("deviation", "um"),
-            division_um: um,
-            series: columns.iter().filter_map(panel).collect(),
-        }),
+        panels([&angle, &deviation], um, &series),
     )
 }
 
@@ -287,5 +285,5 @@ fn curves(test: &TestSensitivities, columns: &[Sensitivity]) -> Figure {
         series.collect(),
     );
     let caption = "Change of the reading by each error alone, of this size, along the first run.";
-    Figure::new(format!("sensitivity-{name}"), title, caption, Chart::Lines(lines))
+    Figure::new(format!("sensitivity-{name}"), title, caption, lines)
 }

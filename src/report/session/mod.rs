@@ -28,8 +28,8 @@ use serde_json::json;
 use self::plots::SessionPlots;
 use self::residuals::{omitted_tests, unaffected};
 use super::block::{Report, Text};
-use super::figure::matrix::Matrix;
-use super::figure::{Chart, Figure, chain};
+use super::figure::matrix::matrix;
+use super::figure::{Figure, chain};
 use super::number::{unit, value_and_u, with_minus_signs};
 
 /// Maximum number of rows of a correlation map.
@@ -95,29 +95,29 @@ pub fn traces(report: &mut Report, session: &SessionPlots<'_>) {
 
 /// The section of the correlations of the errors and effects of a fit.
 pub fn correlations(report: &mut Report, problem: &Problem, fit: &Fit) {
-    let (mut ids, mut matrix) = correlation(problem, fit);
+    let (mut ids, mut rows) = correlation(problem, fit);
     let all = ids.len();
     if all < 2 {
         return;
     }
     ids.truncate(MAX_CORRELATED);
-    matrix.truncate(MAX_CORRELATED);
-    let matrix = matrix.into_iter().map(|row| row.into_iter().take(MAX_CORRELATED).map(Some).collect());
+    rows.truncate(MAX_CORRELATED);
+    let rows: Vec<_> = rows.iter().map(|row| row.iter().take(MAX_CORRELATED).copied().map(Some).collect()).collect();
     report.section("Correlation");
     report.page("Strongly correlated errors are poorly separable. A confounded parameter has no value of its own.");
     if all > MAX_CORRELATED {
         report.page(Text::Note(format!("The map shows the first {MAX_CORRELATED} of {all} parameters.")));
     }
-    report.figures([correlation_map(ids, matrix.collect())]);
+    report.figures([correlation_map(&ids, &rows)]);
 }
 
 /// A correlation map.
-pub fn correlation_map(ids: Vec<String>, rows: Vec<Vec<Option<f64>>>) -> Figure {
+pub fn correlation_map(ids: &[String], rows: &[Vec<Option<f64>>]) -> Figure {
     Figure::new(
         "correlation",
         "Correlation",
         "Below the diagonal: the area of a symbol is the magnitude. Above the diagonal: the value, if it fits.",
-        Chart::Matrix(Matrix { quantity: "correlation", ids, rows }),
+        matrix("correlation", ids, rows),
     )
 }
 

@@ -6,9 +6,9 @@ use abbe::identify::series::{SessionSeries, TestSeries, is_round, lengths};
 use super::abscissae::{PlotAxis, axes_of};
 use super::decimate;
 use crate::report::figure::lines::{Axis, Lines, Live, Mark, Series, Size};
-use crate::report::figure::polar::{DIVISIONS, Polar, division_um};
+use crate::report::figure::polar::{DIVISIONS, division_um, polar};
 use crate::report::figure::scale::{Scale, round_up, span};
-use crate::report::figure::{Chart, Figure, Quantity};
+use crate::report::figure::{Figure, Quantity};
 
 /// Intervals of a traversal in which the minimum and the maximum are kept.
 const TRAVERSAL_INTERVALS: usize = 360;
@@ -162,15 +162,10 @@ impl<'d> SessionPlots<'d> {
         let series: Vec<Series> = series.collect();
         let drawn_um = series.iter().flat_map(|series| &series.points).map(|(_, um)| *um);
         let quantity = if column == Column::Deviation { "deviation" } else { "residual" };
-        let polar = Polar {
-            angle: Quantity::new(&test.way.name, "deg"),
-            deviation: Quantity::new(quantity, self.series.unit.name()),
-            division_um: um.unwrap_or_else(|| division_um(drawn_um)),
-            series,
-            live: (number, column.name()),
-        };
-        let name = format!("{name}-{}", test.name);
-        Figure::new(name, title, "Magnified about the nominal circle.", Chart::Polar(polar))
+        let (angle, read) = (Quantity::new(&test.way.name, "deg"), Quantity::new(quantity, self.series.unit.name()));
+        let um = um.unwrap_or_else(|| division_um(drawn_um));
+        let chart = polar([&angle, &read], um, &series, (number, column.name()));
+        Figure::new(format!("{name}-{}", test.name), title, "Magnified about the nominal circle.", chart)
     }
 
     /// Polar plot of the deviation of a test, if its abscissa is an angle.
@@ -291,7 +286,7 @@ impl<'d> SessionPlots<'d> {
             format!("{}-{}-over-{}", if is_deviation { "deviation" } else { "residual" }, test.name, axis.name),
             format!("{}: {quantity} against {}", test.name, axis.name),
             caption,
-            Chart::Lines(lines),
+            lines,
         )
     }
 }

@@ -5,9 +5,9 @@
 use abbe::identify::series::places::{Sighting, sightings};
 
 use super::plots::SessionPlots;
+use crate::report::figure::Figure;
 use crate::report::figure::lines::{Axis, Lines, Mark, Series, Size};
 use crate::report::figure::scale::{Scale, round_up, span, text};
-use crate::report::figure::{Chart, Figure};
 use crate::report::number::quantity;
 
 /// The residual before is drawn if its rms is at most this multiple of that after; otherwise nothing could be read of
@@ -110,7 +110,7 @@ impl<'s> Panels<'s> {
             ("azimuth", 0) => format!("Across: azimuth times the cosine of the elevation.{}", self.remark),
             _ => String::new(),
         };
-        Figure::new(format!("sky-{channel}-over-{name}"), title, caption, Chart::Lines(lines.sized(Size::SMALL)))
+        Figure::new(format!("sky-{channel}-over-{name}"), title, caption, lines.sized(Size::SMALL))
     }
 
     /// The residual as a vector at each star, on a map with the zenith at the centre.
@@ -140,7 +140,7 @@ impl<'s> Panels<'s> {
         let [x, y] = ["east", "north"].map(|to| Axis::new(format!("zenith distance to the {to}"), "deg", scale));
         let caption = "Residual at each star; the zenith is at the centre.";
         let lines = Lines::new(x, y, series).sized(Size::SQUARE);
-        Figure::new("sky-map", "Residuals on the sky", caption, Chart::Lines(lines))
+        Figure::new("sky-map", "Residuals on the sky", caption, lines)
     }
 
     /// Across against up, with the circles of the rms.
@@ -158,12 +158,7 @@ impl<'s> Panels<'s> {
         }
         let [x, y] = ["across", "up"].map(|channel| Axis::new(channel, self.unit, self.residuals()));
         let lines = Lines::new(x, y, series).sized(Size::SQUARE);
-        Figure::new(
-            "sky-scatter",
-            "Scatter of the residuals",
-            "The circles have the sky rms as radius.",
-            Chart::Lines(lines),
-        )
+        Figure::new("sky-scatter", "Scatter of the residuals", "The circles have the sky rms as radius.", lines)
     }
 
     /// The share of stars with a residual of at most a size.
@@ -182,7 +177,7 @@ impl<'s> Panels<'s> {
         let y = Axis::new("share of stars", "%", Scale { step: 25.0, ..Scale::over([0.0, 100.0], 4) });
         let lines = Lines::new(x, y, series).sized(Size::SQUARE);
         let caption = "Share of stars whose residual is at most so long.";
-        Figure::new("sky-distribution", "Distribution of the residuals", caption, Chart::Lines(lines))
+        Figure::new("sky-distribution", "Distribution of the residuals", caption, lines)
     }
 }
 

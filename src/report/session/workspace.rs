@@ -3,8 +3,8 @@
 use abbe::identify::series::places::{View, views as of_places};
 
 use super::plots::SessionPlots;
-use crate::report::figure::bubbles::{Bubble, Bubbles};
-use crate::report::figure::{Chart, Figure, Quantity};
+use crate::report::figure::bubbles::bubbles;
+use crate::report::figure::{Figure, Quantity};
 
 /// Two views before and after; none for readings along runs and for directions of the sky.
 pub fn views(session: &SessionPlots<'_>) -> Vec<Figure> {
@@ -17,18 +17,12 @@ pub fn views(session: &SessionPlots<'_>) -> Vec<Figure> {
 
 fn figure(session: &SessionPlots<'_>, view: &View) -> Figure {
     let [first, second] = &view.names;
-    let bubbles = Bubbles {
-        axes: view.names.each_ref().map(|name| Quantity::new(name, view.unit)),
-        size: Quantity::new("residual", session.series.unit.name()),
-        apart: view.cell,
-        has_before: session.has_change(),
-        bubbles: view.cells.iter().map(|cell| Bubble { at: cell.at, before: cell.before, after: cell.after }).collect(),
-    };
+    let size = Quantity::new("residual", session.series.unit.name());
     let place = if view.unit == "mm" { "the nominal place of the target in R" } else { "both joints" };
     Figure::new(
         format!("residual-over-{first}-{second}"),
         format!("Residual over {first} and {second}"),
         format!("Diameter: rms length of the residual in a cell, over {place}."),
-        Chart::Bubbles(bubbles),
+        bubbles(view, &size, session.has_change()),
     )
 }
