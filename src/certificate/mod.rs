@@ -12,14 +12,15 @@ use abbe_identify::fit::FitResult;
 use abbe_identify::problem::Problem;
 use abbe_model::Diagnostic;
 use abbe_model::calendar;
-use abbe_model::document::fault::Fault;
+use abbe_model::document::fault::{Fault, Within};
 use abbe_model::parameter_id::ParameterId;
 use abbe_model::session::Session;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 /// The administrative data of a certificate: what no measurement tells.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Certificate {
     /// Number, dates and place.
@@ -42,7 +43,7 @@ pub struct Certificate {
 }
 
 /// Number, dates and place of a certificate.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename = "certificate_head", deny_unknown_fields)]
 pub struct Head {
     /// The number of the certificate, which no other has.
@@ -61,7 +62,7 @@ pub struct Head {
 }
 
 /// Where a measurement is made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename = "certificate_place", rename_all = "kebab-case")]
 pub enum Place {
     /// At the customer's.
@@ -78,7 +79,7 @@ pub enum Place {
 }
 
 /// What is calibrated.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename = "certificate_item", deny_unknown_fields)]
 pub struct Item {
     /// Name; by default that of the machine.
@@ -92,7 +93,7 @@ pub struct Item {
 }
 
 /// A measuring device.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename = "certificate_equipment", deny_unknown_fields)]
 pub struct Equipment {
     /// Name.
@@ -108,7 +109,7 @@ pub struct Equipment {
 }
 
 /// An organisation and where it is.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename = "certificate_organisation", deny_unknown_fields)]
 pub struct Organisation {
     /// Name.
@@ -130,7 +131,7 @@ pub struct Organisation {
 }
 
 /// A person who is responsible for a certificate.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename = "certificate_person", deny_unknown_fields)]
 pub struct Person {
     /// Name.
@@ -143,7 +144,7 @@ pub struct Person {
 }
 
 /// The conditions during a measurement.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename = "certificate_conditions", deny_unknown_fields)]
 pub struct Conditions {
     /// Lowest and highest temperature of the air, °C.
@@ -205,52 +206,19 @@ pub fn read(source: &Source) -> Result<Certificate, Diagnostic> {
 fn check(certificate: &Certificate) -> Result<(), Fault> {
     let head = &certificate.certificate;
     let of_head = |fault: Fault| fault.at("certificate");
-    texts([("id", Some(&head.id))]).map_err(of_head)?;
-    code("country", &head.country, char::is_ascii_uppercase).map_err(of_head)?;
-    if let Some(language) = &head.language {
-        code("language", language, char::is_ascii_lowercase).map_err(of_head)?;
-    }
+    code("country", Some(&head.country), char::is_ascii_uppercase).map_err(of_head)?;
+    code("language", head.language.as_ref(), char::is_ascii_lowercase).map_err(of_head)?;
     for (key, day) in [("begin", &head.begin), ("end", &head.end)] {
         if day.as_deref().is_some_and(|text| self::day(text).is_none()) {
             return Err(of_head(Fault::unexpected("a day: \"2026-11-23\"").at(key)));
         }
     }
-    for (key, organisation) in [("laboratory", &certificate.laboratory), ("customer", &certificate.customer)] {
-        let Organisation { name, street, post_code, city, country, email, phone, code: own } = organisation;
-        let stated = [
-            ("name", Some(name)),
-            ("street", street.as_ref()),
-            ("post_code", post_code.as_ref()),
-            ("city", Some(city)),
-            ("email", Some(email)),
-            ("phone", phone.as_ref()),
-            ("code", own.as_ref()),
-        ];
-        texts(stated).map_err(|fault| fault.at(key))?;
-        if let Some(country) = country {
-            code("country", country, char::is_ascii_uppercase).map_err(|fault| fault.at(key))?;
-        }
+    for (key, own) in [("laboratory", &certificate.laboratory), ("customer", &certificate.customer)] {
+        code("country", own.country.as_ref(), char::is_ascii_uppercase).within(key)?;
     }
-    let Item { name, manufacturer, model, serial_number } = &certificate.item;
-    let stated = [("name", name), ("manufacturer", manufacturer), ("model", model), ("serial_number", serial_number)];
-    texts(stated.map(|(key, text)| (key, text.as_ref()))).map_err(|fault| fault.at("item"))?;
-    for (number, equipment) in certificate.equipment.iter().enumerate() {
-        let Equipment { name, manufacturer, model, serial_number, certificate } = equipment;
-        let stated = [
-            ("name", Some(name)),
-            ("manufacturer", manufacturer.as_ref()),
-            ("model", model.as_ref()),
-            ("serial_number", serial_number.as_ref()),
-            ("certificate", certificate.as_ref()),
-        ];
-        texts(stated).map_err(|fault| fault.at_item(number).at("equipment"))?;
-    }
+    texts(&serde_json::to_value(certificate).map_err(|fault| fault.to_string())?)?;
     if certificate.person.is_empty() {
         return Err(Fault::missing("person", "who is responsible for the certificate: `[[person]]` with `name`"));
-    }
-    for (number, person) in certificate.person.iter().enumerate() {
-        texts([("name", Some(&person.name)), ("role", person.role.as_ref())])
-            .map_err(|fault| fault.at_item(number).at("person"))?;
     }
     match certificate.conditions.temperature_c.as_deref() {
         None => Ok(()),
@@ -262,13 +230,15 @@ fn check(certificate: &Certificate) -> Result<(), Fault> {
 }
 
 /// Refuses texts that are empty, have blanks at an end or characters that XML does not permit.
-fn texts<'t>(stated: impl IntoIterator<Item = (&'static str, Option<&'t String>)>) -> Result<(), Fault> {
-    for (key, text) in stated {
-        if text.is_some_and(|text| !is_text(text)) {
-            return Err(Fault::unexpected("a text without blanks at its ends and without control characters").at(key));
+fn texts(of: &Value) -> Result<(), Fault> {
+    match of {
+        Value::String(text) if !is_text(text) => {
+            Err(Fault::unexpected("a text without blanks at its ends and without control characters"))
         }
+        Value::Array(items) => (0..).zip(items).try_for_each(|(number, item)| texts(item).within_item(number)),
+        Value::Object(table) => table.iter().try_for_each(|(key, value)| texts(value).within(key)),
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 /// Whether a text is one that a certificate may have: not empty, without blanks at its ends, and of characters that XML 1.0
@@ -278,8 +248,9 @@ fn is_text(text: &str) -> bool {
     !text.is_empty() && text.trim() == text && text.chars().all(is_permitted)
 }
 
-fn code(key: &'static str, text: &str, is_letter: fn(&char) -> bool) -> Result<(), Fault> {
-    if text.len() == 2 && text.chars().all(|letter| is_letter(&letter)) {
+/// Refuses what is no code of two letters.
+fn code(key: &str, text: Option<&String>, is_letter: fn(&char) -> bool) -> Result<(), Fault> {
+    if text.is_none_or(|text| text.len() == 2 && text.chars().all(|letter| is_letter(&letter))) {
         return Ok(());
     }
     let example =
