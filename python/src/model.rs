@@ -74,8 +74,8 @@ impl Model {
     fn parameters(&self) -> Vec<(String, f64, f64, String, bool)> {
         let parameters = self.model.parameters.iter().enumerate();
         let row = |(j, parameter): (usize, &model_file::ModelParameter)| {
-            let scale = parameter.unit.display_per_internal;
-            let name = parameter.unit.name.clone();
+            let scale = parameter.display_per_internal;
+            let name = parameter.unit.clone();
             (parameter.id.to_string(), parameter.value * scale, self.model.u(j) * scale, name, parameter.held)
         };
         parameters.map(row).collect()

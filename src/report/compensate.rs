@@ -5,7 +5,6 @@ use std::path::Path;
 use abbe::apply::correction::stream::Summary;
 use abbe::identify::model_file::{IdentifiedModel, ModelParameter};
 use abbe::model::pose::Aim;
-use abbe::model::session::Prior;
 use abbe::model::words::{counted, first_of, with_exponent};
 
 use super::block::Report;
@@ -84,9 +83,9 @@ fn marked(summary: &Summary) -> Table {
 /// A warning if the tool point of the model is the target of the instrument, which no one stated and the fit placed.
 pub fn fitted_tool(model: &IdentifiedModel) -> Option<String> {
     let is_of_tool = |own: &ModelParameter| matches!(own.id.thing(), Some("target" | "spindle_ball"));
-    let free = |own: &&ModelParameter| is_of_tool(own) && own.prior == Prior::Free && !own.held;
+    let free = |own: &&ModelParameter| is_of_tool(own) && own.prior_u.is_none() && !own.held;
     let placed: Vec<String> = (model.parameters.iter().filter(free))
-        .map(|own| format!("{} by {:.1} µm", own.id, own.value * own.unit.display_per_internal))
+        .map(|own| format!("{} by {:.1} µm", own.id, own.value * own.display_per_internal))
         .collect();
     (!placed.is_empty()).then(|| {
         format!(

@@ -91,7 +91,7 @@ impl Pair {
         let mut names: Vec<String> = self.first.truth.piges().map(|(id, ..)| id.to_string()).collect();
         let chosen = names.swap_remove(random(33, self.number).random_range(0..names.len()));
         let j = self.model.parameters.iter().position(|parameter| parameter.id.to_string() == chosen).unwrap();
-        let u = self.model.u(j) * self.model.parameters[j].unit.display_per_internal;
+        let u = self.model.u(j) * self.model.parameters[j].display_per_internal;
         (chosen, CHANGE_U * u)
     }
 }

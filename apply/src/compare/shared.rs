@@ -89,7 +89,7 @@ pub(super) fn difference(
     add(b, &place_b)?;
     let enlargement = a.fit.u_enlargement.max(b.fit.u_enlargement);
     for (i, _) in &shared {
-        if let Prior::Gaussian(u) = a.parameters[*i].prior {
+        if let Prior::Gaussian(u) = a.parameters[*i].prior() {
             information[(*i, *i)] -= (enlargement * u).powi(-2);
         }
     }
@@ -143,7 +143,7 @@ fn thing(model: &IdentifiedModel, parameter: usize) -> &str {
 fn test(a: &IdentifiedModel, b: &IdentifiedModel, (i, j): (usize, usize)) -> Option<NotShared> {
     let alone = |model: &IdentifiedModel, k: usize| {
         let variance = model.covariance[(k, k)];
-        let of_prior = match model.parameters[k].prior {
+        let of_prior = match model.parameters[k].prior() {
             Prior::Gaussian(u) => (model.fit.u_enlargement * u).powi(-2),
             Prior::Free | Prior::Known => 0.0,
         };
@@ -181,7 +181,7 @@ fn shared(
 ) -> Result<Vec<(usize, usize)>, Diagnostic> {
     let is_setup = |p: &ModelParameter| p.id.is_setup() && !p.held;
     let of_both = a.parameters.iter().enumerate().filter(|(_, p)| is_setup(p)).filter_map(|(i, p)| {
-        let same = |q: &ModelParameter| q.id == p.id && is_setup(q) && q.prior == p.prior;
+        let same = |q: &ModelParameter| q.id == p.id && is_setup(q) && q.prior_u == p.prior_u;
         b.parameters.iter().position(same).map(|j| (i, j))
     });
     let mut of_both: Vec<(usize, usize)> = of_both.collect();
@@ -202,7 +202,7 @@ fn shared(
     }
     of_both.retain(|(i, _)| match things {
         Some(things) => things.iter().any(|stated| stated == thing(*i)),
-        None => thing(*i) == "bar" && matches!(a.parameters[*i].prior, Prior::Gaussian(_)),
+        None => thing(*i) == "bar" && a.parameters[*i].prior_u.is_some(),
     });
     Ok(of_both)
 }

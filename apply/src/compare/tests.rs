@@ -8,6 +8,7 @@ use abbe_identify::model_file::{ModelParameter, Provenance};
 use abbe_identify::quantity::Given;
 use abbe_identify::results::ParameterChange;
 use abbe_identify::simulate::{Simulation, simulate};
+use abbe_model::document::value::Positive;
 use abbe_model::instrument::ballbar::BAR;
 use abbe_model::session::{Prior, Session};
 use rand::SeedableRng;
@@ -198,7 +199,7 @@ fn a_shared_bar_keeps_one_prior_under_enlarged_uncertainties() {
         let mut model = fitted.clone();
         model.parameters = vec![
             ModelParameter { value: reading_mm, held: false, ..own("EX0C") },
-            ModelParameter { value: 0.0, held: false, prior: Prior::Gaussian(bar), ..own("bar[C100]") },
+            ModelParameter { value: 0.0, held: false, prior_u: Some(Positive(bar)), ..own("bar[C100]") },
         ];
         let square = Mat::from_fn(2, 2, |i, j| match (i, j) {
             (0, 0) => noise * noise + (bars * bar).powi(2),

@@ -98,7 +98,7 @@ pub fn rms_of_moved(model: &IdentifiedModel, moved: &[MovedParameter]) -> Result
     for parameter in &mut after.parameters {
         let id = parameter.id.to_string();
         let changes = moved.iter().map(|moved| &moved.change).filter(|change| change.id == id);
-        parameter.value += changes.map(|change| change.value).sum::<f64>() / parameter.unit.display_per_internal;
+        parameter.value += changes.map(|change| change.value).sum::<f64>() / parameter.display_per_internal;
     }
     Ok(evaluate(&[model, &after], PLACES)?.iter().map(|volume| volume.rms_um).collect())
 }

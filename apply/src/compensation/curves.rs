@@ -165,7 +165,7 @@ pub fn of_model(model: &IdentifiedModel, references: &[(String, f64)]) -> Result
         }
         let own =
             |other: &ModelParameter, is_number: bool| other.effect == Some(index) && other.id.is_number() == is_number;
-        let of_effect = |wanted: usize| list.iter().position(|other| own(other, false) && other.index == wanted);
+        let of_effect = |wanted: usize| list.iter().position(|other| own(other, false) && other.index == Some(wanted));
         let coefficients = (0..effect.shape.coefficients()).map(|k| of_effect(k).filter(|j| list[*j].identifiable));
         let (Some(axis), Some(coefficients)) =
             (machine.axis_index(&error.axis), coefficients.collect::<Option<Vec<usize>>>())

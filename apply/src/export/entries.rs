@@ -19,7 +19,6 @@ use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::driver::Driver;
 use abbe_model::effect::Effect;
 use abbe_model::frames::Point;
-use abbe_model::session::Prior;
 use abbe_model::session::readings::Readings;
 use nalgebra::{DMatrix, DVector, Vector3};
 use schemars::JsonSchema;
@@ -126,7 +125,7 @@ pub fn best_locations(model: &IdentifiedModel, tool_mm: [f64; 3]) -> Result<(Vec
     let (free, none) = (vec![true; slots.len()], vec![0.0; slots.len()]);
     let plain: Vec<f64> = slots.iter().map(|slot| errors[*slot]).collect();
     let mut lines = Lines::of(model, slots.clone(), &Travel::measured(model), tool_mm)?;
-    let set_up_anew = model.parameters.iter().any(|own| own.id.is_setup() && own.prior == Prior::Free);
+    let set_up_anew = model.parameters.iter().any(|own| own.id.is_setup() && own.prior_u.is_none());
     if set_up_anew {
         lines = lines.with_free_set_up();
     }

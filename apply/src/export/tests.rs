@@ -1,12 +1,13 @@
 //! Exported descriptions, read by kinematics that know the format and not its writer.
 
 use abbe_files::robot::dh::Convention;
+use abbe_identify::model_file::document::{Role, SCHEMA, SCHEMA_VERSION};
 use abbe_identify::model_file::{IdentifiedModel, ModelParameter, Provenance};
 use abbe_identify::noise::{Noise, NoiseSource};
 use abbe_identify::results::ModelFit;
 use abbe_model::chain::{AxisPosition, Machine};
+use abbe_model::document::kind::Kind;
 use abbe_model::frames::Point;
-use abbe_model::session::Prior;
 use abbe_model::unit::Unit;
 use faer::Mat;
 use nalgebra::{Matrix4, Rotation3, Vector3};
@@ -21,20 +22,27 @@ pub(super) fn model(machine: Machine, errors: &[(String, f64)]) -> IdentifiedMod
         .iter()
         .map(|(id, value)| ModelParameter {
             id: id.parse().unwrap(),
+            role: Role::Location,
             effect: None,
-            index: 0,
-            unit: Unit::Micrometre.into(),
+            index: None,
+            displayed: *value * 1e3,
+            displayed_u: Some(1.0),
+            unit: "um".into(),
+            display_per_internal: 1e3,
             value: *value,
             held: false,
             identifiable: true,
-            prior: Prior::Free,
+            prior_u: None,
             size: 1.0,
         })
         .collect();
     let count = parameters.len();
     IdentifiedModel {
+        schema: SCHEMA.into(),
+        schema_version: SCHEMA_VERSION,
+        sha256: String::new(),
         machine,
-        instrument: "tracker".parse().unwrap(),
+        instrument: Kind("tracker".parse().unwrap()),
         effects: Vec::new(),
         parameters,
         covariance: Mat::from_fn(count, count, |i, j| if i == j { 1e-6 } else { 0.0 }),

@@ -55,9 +55,11 @@ impl IdentifiedModel {
     /// The estimate of a parameter, internal units: a number of a shape is stated itself, not as its change.
     pub fn estimate(&self, parameter: usize) -> f64 {
         let parameter = &self.parameters[parameter];
-        match parameter.effect.filter(|_| parameter.id.is_number()) {
-            Some(effect) => self.effects[effect].shape.number(parameter.index) + parameter.value,
-            None => parameter.value,
+        match (parameter.effect, parameter.index) {
+            (Some(effect), Some(index)) if parameter.id.is_number() => {
+                self.effects[effect].shape.number(index) + parameter.value
+            }
+            _ => parameter.value,
         }
     }
 

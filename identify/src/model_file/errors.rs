@@ -67,8 +67,10 @@ impl EstimatedErrors {
             if let Some(slot) = parameter.id.error().and_then(|name| machine.error_slot(name)) {
                 constant[slot] = parameter.value;
             }
-            if let Some(effect) = parameter.effect.filter(|_| parameter.id.is_coefficient()) {
-                coefficients[effect][parameter.index] = parameter.value;
+            if let (Some(effect), Some(index), true) =
+                (parameter.effect, parameter.index, parameter.id.is_coefficient())
+            {
+                coefficients[effect][index] = parameter.value;
             }
         }
         let effects = model.carried_effects().map(|index| EstimatedEffect {

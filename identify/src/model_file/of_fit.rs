@@ -1,15 +1,18 @@
 //! The model of a fit.
 
 use abbe_model::Diagnostic;
-use abbe_model::component::ErrorName;
+use abbe_model::document::kind::Kind;
+use abbe_model::document::value::Positive;
 use abbe_model::driver::Reference;
-use abbe_model::session::Session;
+use abbe_model::session::{Prior, Session};
 
-use super::{IdentifiedModel, ModelParameter, Provenance, motion, range};
+use super::document::{Role, SCHEMA, SCHEMA_VERSION};
+use super::{IdentifiedModel, Location, ModelParameter, Provenance, motion, range};
 use crate::error;
 use crate::fit::base::{Gauge, base_parameters};
 use crate::fit::{Fit, minimum};
 use crate::heldout::stated_rms_mm;
+use crate::parameters::Parameter;
 use crate::problem::Problem;
 use crate::results::ModelFit;
 
@@ -26,22 +29,32 @@ impl IdentifiedModel {
         let list = &problem.parameters.list;
         let parameters = list.iter().enumerate().map(|(j, parameter)| ModelParameter {
             id: parameter.id.clone(),
+            role: Role::of(&parameter.id),
             effect: parameter.effect,
-            index: parameter.index,
-            unit: parameter.unit.clone(),
+            index: parameter.effect.map(|_| parameter.index),
+            displayed: 0.0,
+            displayed_u: None,
+            unit: parameter.unit.name.clone(),
+            display_per_internal: parameter.unit.display_per_internal,
             value: base.beta[j] + parameter.found,
             held: base.held.contains(&j),
             identifiable: fit.rank.is_identifiable(j),
-            prior: parameter.prior,
+            prior_u: match parameter.prior {
+                Prior::Gaussian(u) => Some(Positive(u)),
+                Prior::Free | Prior::Known => None,
+            },
             size: parameter.size,
         });
         let null_directions = base.null_space.col_iter();
         // Values of the set-up count from the stated points.
         let of_first = problem.session.tests.iter().find(|test| test.name == problem.tests[0].name);
         let stated = of_first.map_or(problem.models[0].station(), |test| &test.station);
-        Ok(IdentifiedModel {
+        let mut model = IdentifiedModel {
+            schema: SCHEMA.to_string(),
+            schema_version: SCHEMA_VERSION,
+            sha256: String::new(),
             machine: problem.session.machine.as_ref().clone(),
-            instrument: problem.session.instrument,
+            instrument: Kind(problem.session.instrument),
             effects: problem.parameters.effects.clone(),
             parameters: parameters.collect(),
             covariance: base.covariance,
@@ -63,15 +76,27 @@ impl IdentifiedModel {
             table_mm: stated.table_point_mm().unwrap_or_default(),
             reference: Reference::without_history(problem.reference.time_s, problem.reference.means.clone()),
             provenance,
-        })
+        };
+        for j in 0..model.parameters.len() {
+            let (value, u) = (model.estimate(j), model.u(j));
+            let parameter = &mut model.parameters[j];
+            parameter.displayed = value * parameter.display_per_internal;
+            parameter.displayed_u = (!parameter.held).then_some(u * parameter.display_per_internal);
+        }
+        Ok(model)
     }
 }
 
 /// The location errors as the same readings give them without any effect.
-fn locations(problem: &Problem, fit: &Fit) -> Result<Vec<(ErrorName, f64)>, Diagnostic> {
+fn locations(problem: &Problem, fit: &Fit) -> Result<Vec<Location>, Diagnostic> {
     let named = |problem: &Problem, beta: &[f64]| {
-        let values = problem.parameters.list.iter().zip(beta);
-        values.filter_map(|(parameter, value)| Some((parameter.id.error()?.clone(), *value))).collect()
+        let location = |(parameter, value): (&Parameter, &f64)| {
+            let name = parameter.id.error()?;
+            let unit = name.freedom.unit().displayed();
+            let (displayed, value) = (unit.to_display(*value), *value);
+            Some(Location { id: name.to_string(), displayed, unit: unit.name().to_string(), value })
+        };
+        problem.parameters.list.iter().zip(beta).filter_map(location).collect()
     };
     if problem.parameters.effects.is_empty() {
         return Ok(named(problem, &fit.beta));

@@ -5,18 +5,8 @@
 use abbe_model::driver::{Driver, DriverInput};
 use abbe_model::effect::Effect;
 
+use super::DriverRange;
 use crate::problem::Problem;
-
-/// The range of the position of an axis, or of the values of another driver of an effect.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DriverRange {
-    /// The driver.
-    pub driver: Driver,
-    /// The axis of the component, for a driver whose values differ from component to component (gravity).
-    pub component_axis: Option<String>,
-    /// Least and greatest value, internal units: mm, rad, s, °C above the mean, m.
-    pub range: [f64; 2],
-}
 
 /// Share of the width of a range by which readings may leave it: positions are rounded, and commanded positions are
 /// not reached exactly.
@@ -85,7 +75,11 @@ pub(super) fn of_problem(problem: &Problem, effects: &[Effect]) -> Vec<DriverRan
             }
         }
         if range[0] <= range[1] {
-            ranges.push(DriverRange { driver, component_axis, range });
+            let machine = &problem.session.machine;
+            let about = component_axis.as_deref().and_then(|axis| machine.axis_index(axis));
+            let unit = driver.kind().unit(driver.kind_of_axis(machine, about));
+            let displayed = range.map(|value| unit.to_display(value));
+            ranges.push(DriverRange { driver, component_axis, displayed, unit: unit.result().to_string(), range });
         }
     }
     ranges

@@ -9,23 +9,18 @@ use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::diagnostic::Location;
 use abbe_model::document::fault::{Fault, Within};
-use abbe_model::document::kind::Kind;
-use abbe_model::document::value::{Long, Positive};
-use abbe_model::driver::column::TEMPERATURE;
-use abbe_model::driver::{Driver, Reference};
+use abbe_model::document::value::Long;
+use abbe_model::driver::Driver;
 use abbe_model::effect::Effect;
 use abbe_model::instrument::kinds;
-use abbe_model::session::Prior;
 use abbe_model::session::parameters_of;
 use faer::Mat;
 use serde_json::Value;
 
-use super::document::{self, Document, SCHEMA, SCHEMA_VERSION};
+use super::document::{Document, Role, SCHEMA, SCHEMA_VERSION};
 use super::write::{CHECKSUM, checksum};
-use super::{DriverRange, IdentifiedModel, ModelParameter};
-use crate::noise::Noise;
+use super::{IdentifiedModel, ModelParameter};
 use crate::numerics::symmetric::Symmetric;
-use crate::unit::ParameterUnit;
 
 /// Least eigenvalue of a covariance over its largest, in scaled parameters, below 0 by rounding.
 const ROUNDING_OF_COVARIANCE: f64 = 1e-9;
@@ -115,118 +110,92 @@ fn header(whole: &Value) -> Result<(), Fault> {
     }
 }
 
-fn model(document: Document) -> Result<IdentifiedModel, Fault> {
+/// Checks what a file states, and brings machine, effects and covariance into the form in which they are used.
+fn model(mut document: Document) -> Result<IdentifiedModel, Fault> {
     let machine = machine_of_document(&document.machine).within("machine")?;
-    let Kind(instrument) = document.instrument;
-    let Long(effects) = document.effects;
-    let mut tests: Vec<String> = effects.iter().flat_map(|effect| effect.tests.iter().flatten().cloned()).collect();
+    let mut tests: Vec<String> = document.effects.iter().flat_map(|of| of.tests.iter().flatten().cloned()).collect();
     tests.sort_unstable();
     tests.dedup();
-    let effects = effects.iter().enumerate();
+    let effects = document.effects.iter().enumerate();
     let effects =
         effects.map(|(k, effect)| effect_of_document(effect, &machine, &parameters_of(kinds()), &tests).within_item(k));
     let effects = effects.collect::<Result<Vec<_>, _>>().within("effects")?;
-    let parameters = parameters(&document.parameters.0, &effects, &machine).within("parameters")?;
-    let covariance = covariance(&document.covariance.0, &parameters).within("covariance")?;
-    let null_directions: Vec<Vec<f64>> = document.null_directions.0.into_iter().map(|Long(row)| row).collect();
-    if let Some((k, row)) = null_directions.iter().enumerate().find(|(_, row)| row.len() != parameters.len()) {
-        let what =
-            format!("has {} numbers; one for each of the {} parameters is expected", row.len(), parameters.len());
+    parameters(&document.parameters, &effects, &machine).within("parameters")?;
+    let covariance = covariance(&document.covariance.0, &document.parameters).within("covariance")?;
+    let count = document.parameters.len();
+    if let Some((k, row)) = document.null_directions.iter().enumerate().find(|(_, row)| row.len() != count) {
+        let what = format!("has {} numbers; one for each of the {count} parameters is expected", row.len());
         return Err(Fault::of_key(what, None).at_item(k).at("null_directions"));
     }
-    let locations = document.locations.0.iter().enumerate().map(|(k, location)| {
-        let name = ErrorName::parse(&location.id).filter(|name| machine.error_slot(name).is_some());
-        let fault = || Fault::of_key(format!("is \"{}\", an error that the machine does not have", location.id), None);
-        let name = name.ok_or_else(|| fault().at("id").at_item(k).at("locations"))?;
-        Ok((name, location.internal))
-    });
-    Ok(IdentifiedModel {
-        locations: locations.collect::<Result<_, Fault>>()?,
-        ranges: document.ranges.iter().map(|of| range(&machine, of)).collect(),
-        motion_ranges: document.motion_ranges,
-        fit: document.fit,
-        tool_mm: document.tool_mm,
-        table_mm: document.table_mm,
-        reference: reference(&document.reference),
-        unit: document.reading_unit,
-        noise: noise(document.noise).within("noise")?,
-        machine,
-        instrument,
-        effects,
-        parameters,
-        covariance,
-        null_directions,
-        provenance: document.provenance,
-    })
+    for (k, id) in document.locations.iter().map(|location| &location.id).enumerate() {
+        if ErrorName::parse(id).is_none_or(|name| machine.error_slot(&name).is_none()) {
+            let what = format!("is \"{id}\", an error that the machine does not have");
+            return Err(Fault::of_key(what, None).at("id").at_item(k).at("locations"));
+        }
+    }
+    let inflation = document.noise.inflation;
+    if inflation < 1.0 {
+        return Err(Fault::is(format!("{inflation}; at least 1 is expected")).at("inflation").at("noise"));
+    }
+    document.parameters.iter_mut().for_each(|parameter| parameter.identifiable &= !parameter.held);
+    for range in &mut document.ranges {
+        range.driver = Driver::parse_on(&machine, &range.driver.to_string());
+    }
+    Ok(document.over(machine, effects, covariance))
 }
 
-fn parameters(
-    entries: &[document::Parameter],
-    effects: &[Effect],
-    machine: &Machine,
-) -> Result<Vec<ModelParameter>, Fault> {
-    let parameters: Vec<ModelParameter> = (0..entries.len())
-        .map(|j| parameter(&entries[..j], &entries[j], effects, machine).within_item(j))
-        .collect::<Result<_, _>>()?;
+fn parameters(entries: &[ModelParameter], effects: &[Effect], machine: &Machine) -> Result<(), Fault> {
+    for (j, entry) in entries.iter().enumerate() {
+        parameter(&entries[..j], entry, effects, machine).within_item(j)?;
+    }
     for (k, effect) in effects.iter().enumerate() {
         let own = |own: &&ModelParameter| own.effect == Some(k) && own.id.is_coefficient();
-        let (needed, found) = (effect.shape.coefficients(), parameters.iter().filter(own).count());
+        let (needed, found) = (effect.shape.coefficients(), entries.iter().filter(own).count());
         if found != needed {
             let what = format!("have {found} coefficients of `effects[{k}]`, whose shape has {needed}");
             return Err(Fault::of_key(what, None));
         }
-        let numbers = parameters.iter().filter(|own| own.effect == Some(k) && own.id.is_number());
-        if !numbers.map(|number| number.index).eq(effect.estimated.iter().copied()) {
+        let numbers = entries.iter().filter(|own| own.effect == Some(k) && own.id.is_number());
+        if !numbers.filter_map(|number| number.index).eq(effect.estimated.iter().copied()) {
             return Err(Fault::of_key(format!("do not have the numbers that `effects[{k}]` estimates"), None));
         }
     }
-    Ok(parameters)
+    Ok(())
 }
 
-/// A parameter after the `others`.
+/// Checks a parameter after the `others`.
 fn parameter(
-    others: &[document::Parameter],
-    entry: &document::Parameter,
+    others: &[ModelParameter],
+    entry: &ModelParameter,
     effects: &[Effect],
     machine: &Machine,
-) -> Result<ModelParameter, Fault> {
-    let fault = |what: &str| Fault::of_key(format!("({}): {what}", entry.id), None);
+) -> Result<(), Fault> {
+    let fault = |what: &str| Err(Fault::of_key(format!("({}): {what}", entry.id), None));
     if others.iter().any(|other| other.id == entry.id) {
-        return Err(fault("another parameter has the same name"));
+        return fault("another parameter has the same name");
     }
-    let same = |other: &&document::Parameter| {
-        entry.effect.is_some()
-            && (other.role, other.effect, other.coefficient) == (entry.role, entry.effect, entry.coefficient)
+    let same = |other: &&ModelParameter| {
+        entry.effect.is_some() && (other.role, other.effect, other.index) == (entry.role, entry.effect, entry.index)
     };
     if let Some(other) = others.iter().find(same) {
-        return Err(fault(&format!("it is the coefficient of an effect that {} is too", other.id)));
+        return fault(&format!("it is the coefficient of an effect that {} is too", other.id));
     }
-    if entry.role == document::Role::Location && entry.id.error().and_then(|name| machine.error_slot(name)).is_none() {
-        return Err(fault("the machine has no such error"));
+    if entry.role == Role::Location && entry.id.error().and_then(|name| machine.error_slot(name)).is_none() {
+        return fault("the machine has no such error");
     }
     let effect = entry.effect.and_then(|effect| effects.get(effect));
-    let is_known = match (entry.role, effect, entry.coefficient) {
-        (document::Role::Coefficient, Some(effect), Some(place)) => place < effect.shape.coefficients(),
-        (document::Role::Number, Some(effect), Some(place)) => effect.estimated.contains(&place),
-        (document::Role::Location | document::Role::SetUp, ..) => (entry.effect, entry.coefficient) == (None, None),
+    let is_known = match (entry.role, effect, entry.index) {
+        (Role::Coefficient, Some(effect), Some(place)) => place < effect.shape.coefficients(),
+        (Role::Number, Some(effect), Some(place)) => effect.estimated.contains(&place),
+        (Role::Location | Role::SetUp, ..) => (entry.effect, entry.index) == (None, None),
         _ => false,
     };
-    if !is_known || entry.role != document::Role::of(&entry.id) {
-        return Err(fault(
+    if !is_known || entry.role != Role::of(&entry.id) {
+        return fault(
             "`role` is \"location\", \"set-up\", \"coefficient\" or \"number\", the last two with an index of `effects`",
-        ));
+        );
     }
-    Ok(ModelParameter {
-        id: entry.id.clone(),
-        effect: entry.effect,
-        index: entry.coefficient.unwrap_or_default(),
-        unit: ParameterUnit { name: entry.unit.clone(), display_per_internal: entry.display_per_internal.0 },
-        value: entry.internal,
-        held: entry.held,
-        identifiable: entry.identifiable && !entry.held,
-        prior: entry.prior_u.map_or(Prior::Free, |Positive(u)| Prior::Gaussian(u)),
-        size: entry.size.0,
-    })
+    Ok(())
 }
 
 /// The covariance, which must be positive semidefinite.
@@ -253,28 +222,4 @@ fn covariance(rows: &[Long<Vec<f64>>], parameters: &[ModelParameter]) -> Result<
         return Err(not_definite(format!("its correlation matrix has the eigenvalue {least:.2e}")));
     }
     Ok(Mat::from_fn(count, count, entry))
-}
-
-fn noise(noise: document::Noise) -> Result<Noise, Fault> {
-    if noise.inflation < 1.0 {
-        return Err(Fault::is(format!("{}; at least 1 is expected", noise.inflation)).at("inflation"));
-    }
-    Ok(Noise {
-        sigma_mm: noise.noise_um.0 * 1e-3,
-        ar_coefficients: noise.ar_coefficients,
-        ar_sum_u: noise.ar_sum_u,
-        source: noise.source,
-        inflation: noise.inflation,
-    })
-}
-
-fn range(machine: &Machine, range: &document::Range) -> DriverRange {
-    let driver = Driver::parse_on(machine, &range.driver);
-    DriverRange { driver, component_axis: range.axis.clone(), range: range.internal }
-}
-
-fn reference(stated: &document::Reference) -> Reference {
-    let mut means = stated.drivers.clone();
-    means.insert(TEMPERATURE.to_string(), stated.temperature_c);
-    Reference::without_history(stated.time_s, means)
 }

@@ -3,6 +3,7 @@ use std::path::Path;
 use abbe_files::ReadOptions;
 use abbe_files::read::effect_of_document;
 use abbe_model::Diagnostic;
+use abbe_model::component::ErrorName;
 use abbe_model::document::effect;
 use abbe_model::document::node::Named;
 use abbe_model::driver::Driver;

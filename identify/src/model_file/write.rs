@@ -1,16 +1,12 @@
 //! A model as a JSON text.
 
 use abbe_model::Diagnostic;
-use abbe_model::document::kind::Kind;
 use abbe_model::document::of_domain;
-use abbe_model::document::value::{Long, Positive};
-use abbe_model::driver::column::TEMPERATURE;
-use abbe_model::session::Prior;
+use abbe_model::document::value::Long;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-use super::IdentifiedModel;
-use super::document::{self, Document, SCHEMA, SCHEMA_VERSION};
+use super::document::{Document, IdentifiedModel};
 use crate::error;
 
 /// The key of the checksum.
@@ -37,90 +33,10 @@ impl IdentifiedModel {
     }
 
     fn document(&self) -> Document {
-        let size = self.parameters.len();
-        Document {
-            schema: SCHEMA.to_string(),
-            schema_version: SCHEMA_VERSION,
-            sha256: String::new(),
-            provenance: self.provenance.clone(),
-            machine: of_domain::machine(&self.machine),
-            instrument: Kind(self.instrument),
-            effects: Long(self.effects.iter().map(|effect| of_domain::effect(effect, &self.machine)).collect()),
-            parameters: Long((0..size).map(|j| self.parameter(j)).collect()),
-            covariance: Long((0..size).map(|i| Long((0..=i).map(|j| self.covariance[(i, j)]).collect())).collect()),
-            null_directions: Long(self.null_directions.iter().cloned().map(Long).collect()),
-            locations: Long(self.locations.iter().map(location).collect()),
-            reading_unit: self.unit,
-            noise: document::Noise {
-                noise_um: Positive(self.noise.sigma_mm * 1e3),
-                source: self.noise.source,
-                ar_coefficients: self.noise.ar_coefficients.clone(),
-                ar_sum_u: self.noise.ar_sum_u,
-                inflation: self.noise.inflation,
-            },
-            fit: self.fit,
-            ranges: self.ranges.iter().map(|range| self.range(range)).collect(),
-            motion_ranges: self.motion_ranges.clone(),
-            tool_mm: self.tool_mm,
-            table_mm: self.table_mm,
-            reference: document::Reference {
-                time_s: self.reference.time_s,
-                temperature_c: self.reference.means.get(TEMPERATURE).copied().unwrap_or(0.0),
-                drivers: self
-                    .reference
-                    .means
-                    .iter()
-                    .filter(|(name, _)| *name != TEMPERATURE)
-                    .map(|(name, mean)| (name.clone(), *mean))
-                    .collect(),
-            },
-        }
-    }
-
-    fn parameter(&self, j: usize) -> document::Parameter {
-        let parameter = &self.parameters[j];
-        let display = parameter.unit.display_per_internal;
-        document::Parameter {
-            id: parameter.id.clone(),
-            role: document::Role::of(&parameter.id),
-            effect: parameter.effect,
-            coefficient: parameter.effect.map(|_| parameter.index),
-            value: self.estimate(j) * display,
-            u: (!parameter.held).then(|| self.u(j) * display),
-            unit: parameter.unit.name.clone(),
-            display_per_internal: Positive(display),
-            internal: parameter.value,
-            held: parameter.held,
-            identifiable: parameter.identifiable,
-            prior_u: match parameter.prior {
-                Prior::Gaussian(u) => Some(Positive(u)),
-                Prior::Free | Prior::Known => None,
-            },
-            size: Positive(parameter.size),
-        }
-    }
-
-    fn range(&self, range: &super::DriverRange) -> document::Range {
-        let component = range.component_axis.as_deref().and_then(|axis| self.machine.axis_index(axis));
-        let kind = range.driver.kind_of_axis(&self.machine, component);
-        let unit = range.driver.kind().unit(kind);
-        document::Range {
-            driver: range.driver.to_string(),
-            axis: range.component_axis.clone(),
-            range: range.range.map(|value| unit.to_display(value)),
-            unit: unit.result().to_string(),
-            internal: range.range,
-        }
-    }
-}
-
-fn location((name, value): &(abbe_model::component::ErrorName, f64)) -> document::Location {
-    let unit = name.freedom.unit().displayed();
-    document::Location {
-        id: name.to_string(),
-        value: unit.to_display(*value),
-        unit: unit.name().to_string(),
-        internal: *value,
+        let row = |i: usize| Long((0..=i).map(|j| self.covariance[(i, j)]).collect());
+        let triangle = Long((0..self.parameters.len()).map(row).collect());
+        let effects = self.effects.iter().map(|effect| of_domain::effect(effect, &self.machine)).collect();
+        self.clone().over(of_domain::machine(&self.machine), effects, triangle)
     }
 }
 

@@ -18,6 +18,7 @@ mod stated;
 pub mod trends;
 mod waves;
 
+use abbe_model::document::value::Positive;
 use abbe_model::session::Test;
 use abbe_model::session::readings::Readings;
 use abbe_model::unit::{Unit, reading};
@@ -32,21 +33,40 @@ use trends::Trends;
 pub use waves::AlongRuns;
 
 /// The noise of one scalar reading.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "ModelNoise")]
 pub struct Noise {
     /// Standard deviation, mm.
+    #[serde(rename = "noise_um", with = "micrometres")]
+    #[schemars(with = "Positive", description = "Standard deviation, µm.")]
     pub sigma_mm: f64,
-    /// Autoregressive coefficients along a run; empty for white noise.
-    pub ar_coefficients: Vec<f64>,
-    /// Standard uncertainty of the sum of these coefficients. The sum determines how slow the noise is, and thus the
-    /// uncertainty of its slow part.
-    pub ar_sum_u: f64,
-    /// Source of the standard deviation.
+    /// Where it comes from.
     pub source: NoiseSource,
-    /// Variance that the likelihood assigns to a reading over the variance of the noise, at least 1. It exceeds 1 if the
-    /// misfit of neighbouring readings is correlated, so that they carry less information than independent readings
-    /// ([`crate::fit`]: families).
+    /// Autoregressive coefficients along a run.
+    // They are empty for white noise.
+    pub ar_coefficients: Vec<f64>,
+    /// Standard uncertainty of their sum.
+    // The sum determines how slow the noise is, and thus the uncertainty of its slow part.
+    pub ar_sum_u: f64,
+    /// Factor on the variance of a reading in the likelihood of families of effects; 1 without families.
+    // It exceeds 1 if the misfit of neighbouring readings is correlated, so that they carry less information than
+    // independent readings ([`crate::fit`]: families).
     pub inflation: f64,
+}
+
+/// A standard deviation in mm, which files state in µm.
+mod micrometres {
+    use abbe_model::document::value::Positive;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub fn serialize<S: Serializer>(mm: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+        (mm * 1e3).serialize(serializer)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+        Positive::deserialize(deserializer).map(|Positive(um)| um * 1e-3)
+    }
 }
 
 /// Source of a noise standard deviation.

@@ -112,7 +112,7 @@ impl<'m> KnownErrors<'m> {
             full.parameters.list.iter().position(|own| match own.effect {
                 Some(effect) => {
                     effects.get(effect).copied() == wanted.effect
-                        && (own.index, own.id.is_number()) == (wanted.index, wanted.id.is_number())
+                        && (Some(own.index), own.id.is_number()) == (wanted.index, wanted.id.is_number())
                 }
                 None => own.id == wanted.id,
             })
@@ -146,10 +146,9 @@ impl<'m> KnownErrors<'m> {
     /// The location errors as estimated without any effect.
     pub fn location_values(&self) -> Vec<f64> {
         let value = |j: &usize| {
-            let own = |(name, _): &&(abbe_model::component::ErrorName, f64)| {
-                self.model.parameters[*j].id.error() == Some(name)
-            };
-            self.model.locations.iter().find(own).map_or(0.0, |(_, value)| *value)
+            let name = self.model.parameters[*j].id.error().map(ToString::to_string);
+            let mut locations = self.model.locations.iter();
+            locations.find(|location| Some(&location.id) == name.as_ref()).map_or(0.0, |location| location.value)
         };
         self.carried.iter().map(value).collect()
     }
