@@ -6,7 +6,6 @@ use abbe_model::Diagnostic;
 use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::scalar::Nominal;
 use abbe_model::session::expression::{Constant, Length};
-use abbe_model::session::motion::Motion;
 use abbe_model::session::planned;
 use abbe_model::session::{Session, Test};
 
@@ -44,7 +43,7 @@ impl<'s> SessionTest<'s> {
         };
         let ranges: Vec<Option<[f64; 2]>> = match (&test.readings, &test.motion) {
             (Some(readings), _) => readings.positions.iter().map(range).collect(),
-            (None, None | Some(Motion::List)) => {
+            (None, None) => {
                 let held = test.at_written.iter().zip(&test.at);
                 let held = held.map(|(written, at)| (written.is_some() || *at != 0.0).then_some([*at; 2]));
                 held.collect()

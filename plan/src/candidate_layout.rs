@@ -5,12 +5,12 @@ use abbe_model::axis::AxisKind;
 use abbe_model::instrument::Station;
 use abbe_model::instrument::ballbar::{BAR, BallBar};
 use abbe_model::session::expression::Length;
-use abbe_model::session::motion::{FollowOffset, Motion};
+use abbe_model::session::motion::{Course, FollowOffset, Motion, Moved, Traversals};
 use abbe_model::session::{Prior, Session, Test, placing};
 use abbe_model::words::{counted, listed};
 
 use super::ball_positions::{BallPosition, axis_positions, ball_count, ball_positions, dot, norm, standing_positions};
-use super::sweep::{Sweep, sweep_of};
+use super::sweep::sweep_of;
 use super::test_variations::TestVariations;
 
 /// Least radius about the swept axis, mm. At smaller radii the bar hardly moves.
@@ -75,20 +75,25 @@ pub(super) fn drafts(session: &Session, variations: &TestVariations, last: &Test
     let mut drafts = Vec::new();
     for &axis in &rotary {
         let whole = sweep_of(session, axis);
-        let sweeps: Vec<Sweep> = variations
-            .ranges
-            .iter()
-            .flat_map(|share| variations.both_directions.iter().map(|both| whole.part(*share, *both)))
+        let traversals = |both: &bool| Traversals::new(whole.traversals.runs(), *both);
+        let shares = variations.ranges.iter();
+        let sweeps: Vec<(f64, Course)> = shares
+            .flat_map(|share| {
+                let ways = variations.both_directions.iter().map(traversals);
+                ways.map(move |traversals| (*share, Course { traversals, ..whole.part(*share) }))
+            })
             .collect();
         let on_table = axis < machine.workpiece_side;
         for ball in ball_positions(session, last.station.kind(), variations, &rotary, on_table) {
             for at in axis_positions(session, variations, &rotary, axis) {
-                for (sweep, &feed) in sweeps.iter().flat_map(|sweep| variations.feeds.iter().map(|feed| (*sweep, feed)))
+                let feeds = variations.feeds.iter();
+                for (&(share, sweep), &feed) in
+                    sweeps.iter().flat_map(|sweep| feeds.clone().map(move |feed| (sweep, feed)))
                 {
                     let ball = &ball;
                     let mut at = at.clone();
                     at[axis] = sweep.from;
-                    let choice = Choice { session, last, axis, sweep, feed, on_table, ball, at: &at };
+                    let choice = Choice { session, last, axis, sweep, share, feed, on_table, ball, at: &at };
                     drafts.extend(variations.bars_mm.iter().flat_map(|nominal| choice.on_axis(variations, *nominal)));
                     let upright = at.iter().enumerate().all(|(k, q)| k == axis || *q == 0.0);
                     if let Some(nominal) = following_bar(variations).filter(|_| variations.follow && upright) {
@@ -112,7 +117,9 @@ struct Choice<'b> {
     session: &'b Session,
     last: &'b Test,
     axis: usize,
-    sweep: Sweep,
+    sweep: Course,
+    /// The share of the range of the axis that it covers.
+    share: f64,
     /// Multiple of the sweep's speed.
     feed: f64,
     on_table: bool,
@@ -159,9 +166,10 @@ impl Choice<'_> {
             }
         }
         name.push_str(words);
-        if self.sweep.is_part || !self.sweep.both_directions {
+        let both_directions = self.sweep.traversals.both_directions();
+        if self.share < 1.0 || !both_directions {
             let [from, to] = [self.sweep.from, self.sweep.to].map(f64::to_degrees);
-            let ways = if self.sweep.both_directions { "in both directions" } else { "in one direction" };
+            let ways = if both_directions { "in both directions" } else { "in one direction" };
             name.push_str(&format!(", swept {from:.0} … {to:.0}° {ways}").replace('-', "−"));
         }
         if self.feed != 1.0 {
@@ -195,6 +203,15 @@ impl Choice<'_> {
             readings: None,
         };
         Draft { test, name, new_setup: self.ball.new }
+    }
+
+    /// The sweep at its feed, with every n-th position.
+    fn course(&self, variations: &TestVariations) -> Course {
+        Course {
+            step: self.sweep.step * variations.thin.max(1) as f64,
+            speed: self.sweep.speed * self.feed,
+            ..self.sweep
+        }
     }
 
     /// The set-up priors: those of the session's last test, and for the bar those of the same bar.
@@ -240,15 +257,7 @@ impl Choice<'_> {
                     return None;
                 }
                 let at = placing::positions_for_bar(machine, &station, self.at, wanted)?;
-                let motion = Motion::Sweep {
-                    axis: self.axis,
-                    from: self.sweep.from,
-                    to: self.sweep.to,
-                    step: self.sweep.step * variations.thin.max(1) as f64,
-                    speed: self.sweep.speed * self.feed,
-                    runs: self.sweep.runs,
-                    both_directions: self.sweep.both_directions,
-                };
+                let motion = Motion { moved: Moved::Axis(self.axis), course: self.course(variations) };
                 let words = if beside == 0.0 {
                     String::new()
                 } else {
@@ -282,16 +291,8 @@ impl Choice<'_> {
         offsets
             .into_iter()
             .map(|(offset, word)| {
-                let motion = Motion::Follow {
-                    axis: self.axis,
-                    from: self.sweep.from,
-                    to: self.sweep.to,
-                    step: self.sweep.step * variations.thin.max(1) as f64,
-                    speed: self.sweep.speed * self.feed,
-                    runs: self.sweep.runs,
-                    both_directions: self.sweep.both_directions,
-                    offset,
-                };
+                let motion =
+                    Motion { moved: Moved::Follow { axis: self.axis, offset }, course: self.course(variations) };
                 let words = format!(", linear axes following with the bar {word}");
                 self.draft(nominal, self.station(nominal), self.at.to_vec(), motion, &words)
             })

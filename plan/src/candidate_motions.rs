@@ -23,7 +23,7 @@ use abbe_model::frames::Point;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::{Following, InstrumentKind, Station, Travel};
 use abbe_model::session::expression::Length;
-use abbe_model::session::motion::{FollowOffset, Motion};
+use abbe_model::session::motion::{Course, FollowOffset, Motion, Moved, Traversals};
 use abbe_model::session::{Prior, Session, Test, placing};
 use abbe_model::words::{listed, number};
 
@@ -46,23 +46,9 @@ const MAX_TEMPLATES: usize = 4;
 /// A motion of one axis, as tests have it.
 #[derive(Clone, Copy)]
 struct Range {
-    from: f64,
-    to: f64,
-    step: f64,
-    speed: f64,
-    runs: usize,
-    both_directions: bool,
+    course: Course,
     /// Multiple of the speed of tests of the axis.
     feed: f64,
-}
-
-impl Range {
-    /// A share of it about its middle.
-    fn part(self, share: f64) -> Range {
-        let middle = 0.5 * (self.from + self.to);
-        let half = 0.5 * share * (self.to - self.from);
-        if share == 1.0 { self } else { Range { from: middle - half, to: middle + half, ..self } }
-    }
 }
 
 /// The candidates of an instrument that has no bar, before travel and reach are checked.
@@ -121,10 +107,15 @@ impl Template<'_> {
     /// The motions of an axis: shares of its range about its middle, one way or both, at each feed.
     fn ranges(&self, axis: usize) -> impl Iterator<Item = Range> {
         let TestVariations { ranges, both_directions, feeds, .. } = self.variations;
-        let own = range(self.session, axis).into_iter();
+        let one_or_both = |own: Course| {
+            let traversals = move |both: &bool| Traversals::new(own.traversals.runs(), *both);
+            both_directions.iter().map(move |both| Course { traversals: traversals(both), ..own })
+        };
+        let at_feed = |own: Course, feed: f64| Range { course: Course { speed: own.speed * feed, ..own }, feed };
+        let own = course(self.session, axis).into_iter();
         own.flat_map(move |own| ranges.iter().map(move |share| own.part(*share)))
-            .flat_map(move |own| both_directions.iter().map(move |both| Range { both_directions: *both, ..own }))
-            .flat_map(move |own| feeds.iter().map(move |feed| Range { speed: own.speed * feed, feed: *feed, ..own }))
+            .flat_map(one_or_both)
+            .flat_map(move |own| feeds.iter().map(move |feed| at_feed(own, *feed)))
     }
 
     /// How often one axis moves while the others stand, with the instrument set up in one way.
@@ -136,7 +127,7 @@ impl Template<'_> {
     /// The number of [`Template::ranges`].
     fn count_of_ranges(&self, axis: usize) -> f64 {
         let TestVariations { ranges, both_directions, feeds, .. } = self.variations;
-        let own = range(self.session, axis).map_or(0.0, |_| 1.0);
+        let own = course(self.session, axis).map_or(0.0, |_| 1.0);
         own * [ranges.len(), both_directions.len(), feeds.len()].map(|count| count as f64).iter().product::<f64>()
     }
 
@@ -176,12 +167,12 @@ impl Template<'_> {
                 let (_, direction) = placing::axis_line(machine, at, axis);
                 for aligned in self.station.aligned(&Travel { machine, axis, direction }) {
                     let mut at = at.clone();
-                    at[axis] = range.from;
+                    at[axis] = range.course.from;
                     let mut words = moved_words(machine, axis, range) + &self.stand_words(&at, axis);
                     if !aligned.words.is_empty() {
                         words += &format!(", {}", aligned.words);
                     }
-                    let motion = self.sweep(axis, range);
+                    let motion = self.motion(Moved::Axis(axis), range);
                     let mounts = match aligned.is_new {
                         true => [PROPOSED.to_string(), PROPOSED.to_string()],
                         false => [self.test.setup.clone(), self.test.spindle_setup.clone()],
@@ -252,18 +243,10 @@ impl Template<'_> {
         let across: Vec<usize> = linear.into_iter().filter(is_across).collect();
         let [first, second] = across[..] else { return Vec::new() };
         let Some(at) = self.touching(point, [0.0; 3], &vec![0.0; machine.axes.len()]) else { return Vec::new() };
-        let motion = Motion::Circle {
-            first,
-            second,
-            radius,
-            centre: [0.0; 3],
-            from: 0.0,
-            to: TAU,
-            step: TAU / STEPS * self.variations.thin.max(1) as f64,
-            speed: SPEED_MM_S,
-            runs: 1,
-            both_directions: true,
-        };
+        let turn =
+            Course { from: 0.0, to: TAU, step: TAU / STEPS, speed: SPEED_MM_S, traversals: Traversals::new(1, true) };
+        let moved = Moved::Circle { axes: [first, second], radius, centre: [0.0; 3] };
+        let motion = self.motion(moved, Range { course: turn, feed: 1.0 });
         let names = [first, second].map(|k| machine.axes[k].name.as_str()).concat();
         let words = format!("a circle in {names} about the artefact{}", self.place_words(point));
         vec![self.at_point(point, at, motion, words)]
@@ -320,16 +303,10 @@ impl Template<'_> {
         Draft { test, name: words, new_setup }
     }
 
-    fn sweep(&self, axis: usize, range: Range) -> Motion {
-        let Range { from, to, step, speed, runs, both_directions, .. } = range;
-        let step = step * self.variations.thin.max(1) as f64;
-        Motion::Sweep { axis, from, to, step, speed, runs, both_directions }
-    }
-
-    fn follow(&self, axis: usize, range: Range, offset: FollowOffset) -> Motion {
-        let Range { from, to, step, speed, runs, both_directions, .. } = range;
-        let step = step * self.variations.thin.max(1) as f64;
-        Motion::Follow { axis, from, to, step, speed, runs, both_directions, offset }
+    /// A motion with every n-th position.
+    fn motion(&self, moved: Moved, Range { course, .. }: Range) -> Motion {
+        let step = course.step * self.variations.thin.max(1) as f64;
+        Motion { moved, course: Course { step, ..course } }
     }
 
     /// Where the axes stand that do not move: `, with Y at 200 mm`.
@@ -397,12 +374,10 @@ impl Contacts<'_> {
                         Following::Touching(..) => FollowOffset::Touching,
                         Following::Apart => FollowOffset::None,
                     };
-                    let follow = template.variations.follow.then(|| template.follow(*axis, *range, offset));
-                    for motion in follow.into_iter().chain([template.sweep(*axis, *range)]) {
-                        let way = match motion {
-                            Motion::Follow { .. } => ", the linear axes follow",
-                            _ => ", the linear axes stand",
-                        };
+                    let follow = (Moved::Follow { axis: *axis, offset }, ", the linear axes follow");
+                    let follow = template.variations.follow.then_some(follow);
+                    for (moved, way) in follow.into_iter().chain([(Moved::Axis(*axis), ", the linear axes stand")]) {
+                        let motion = template.motion(moved, *range);
                         drafts.push(template.at_point(point, at.clone(), motion, format!("{words}{way}")));
                     }
                 }
@@ -415,9 +390,10 @@ impl Contacts<'_> {
 
 fn moved_words(machine: &Machine, axis: usize, range: Range) -> String {
     let axis = &machine.axes[axis];
-    let [from, to] = [range.from, range.to].map(|q| shown(axis.kind.to_display(q)));
-    let ways = if range.both_directions { "" } else { " in one direction" };
-    let feed = if range.feed == 1.0 { String::new() } else { format!(" at {} times the feed", range.feed) };
+    let Range { course, feed } = range;
+    let [from, to] = [course.from, course.to].map(|q| shown(axis.kind.to_display(q)));
+    let ways = if course.traversals.both_directions() { "" } else { " in one direction" };
+    let feed = if feed == 1.0 { String::new() } else { format!(" at {feed} times the feed") };
     format!("{} from {from} to {}{ways}{feed}", axis.name, axis.kind.unit().behind(to))
 }
 
@@ -430,19 +406,13 @@ fn travel(machine: &Machine, axis: usize) -> Option<[f64; 2]> {
     machine.axes[axis].travel.filter(|ends| ends.iter().all(|end| end.abs() < NO_TRAVEL))
 }
 
-/// The range of an axis: that of a test of the session, else that of its readings or its travel, a rotary axis within half a
-/// turn of zero. `None` of a linear axis of which neither is known.
-fn range(session: &Session, axis: usize) -> Option<Range> {
+/// The course of an axis: that of a test of the session, else over that of its readings or its travel, a rotary axis within
+/// half a turn of zero. `None` of a linear axis of which neither is known.
+fn course(session: &Session, axis: usize) -> Option<Course> {
     let kind = session.machine.axes[axis].kind;
-    let of_motion = |test: &Test| match test.motion {
-        Some(
-            Motion::Sweep { axis: moved, from, to, step, speed, runs, both_directions }
-            | Motion::Follow { axis: moved, from, to, step, speed, runs, both_directions, .. },
-        ) => Some((moved, Range { from, to, step, speed, runs, both_directions, feed: 1.0 })),
-        _ => None,
-    };
-    let motions: Vec<(usize, Range)> = session.tests.iter().filter_map(of_motion).collect();
-    if let Some((_, own)) = motions.iter().find(|(moved, _)| *moved == axis) {
+    let motions = session.tests.iter().filter_map(|test| test.motion.as_ref());
+    let courses: Vec<(usize, Course)> = motions.filter_map(|motion| Some((motion.axis()?, motion.course))).collect();
+    if let Some((_, own)) = courses.iter().find(|(moved, _)| *moved == axis) {
         return Some(*own);
     }
     let ends = || {
@@ -461,17 +431,14 @@ fn range(session: &Session, axis: usize) -> Option<Range> {
     if high - low <= 1e-9 {
         return None;
     }
-    let alike = motions.iter().rev().find(|(moved, _)| session.machine.axes[*moved].kind == kind);
+    let alike = courses.iter().rev().find(|(moved, _)| session.machine.axes[*moved].kind == kind);
     let usual = if kind == AxisKind::Rotary { SPEED_RAD_S } else { SPEED_MM_S };
-    let any = motions.last();
-    Some(Range {
+    Some(Course {
         from: low,
         to: high,
         step: kind.to_internal(nice(kind.to_display(high - low) / STEPS)),
-        speed: alike.map_or(usual, |(_, range)| range.speed),
-        runs: any.map_or(1, |(_, range)| range.runs),
-        both_directions: any.is_none_or(|(_, range)| range.both_directions),
-        feed: 1.0,
+        speed: alike.map_or(usual, |(_, course)| course.speed),
+        traversals: courses.last().map_or(Traversals::default(), |(_, course)| course.traversals),
     })
 }
 

@@ -4,7 +4,6 @@ use abbe_model::document::of_domain;
 use abbe_model::document::print::Block;
 use abbe_model::document::test::Test as Document;
 use abbe_model::instrument::SharedBy;
-use abbe_model::session::motion::Motion;
 use abbe_model::session::{Session, Test};
 
 use super::test_variations::TestVariations;
@@ -31,22 +30,9 @@ pub fn proposal(
     let mut test = Test { readings: None, ..candidate.clone() };
     // Candidate tests may be evaluated at every n-th position.
     let thin = variations.thin.max(1) as f64;
-    let name = |axis: usize| session.machine.axes[axis].name.as_str();
-    let moved = match test.motion.as_mut()? {
-        Motion::Sweep { axis, step, .. } | Motion::Follow { axis, step, .. } => {
-            *step /= thin;
-            name(*axis).to_string()
-        }
-        Motion::Circle { first, second, step, .. } => {
-            *step /= thin;
-            [name(*first), name(*second)].concat()
-        }
-        Motion::Line { axes, step, .. } => {
-            *step /= thin;
-            axes.iter().map(|axis| name(*axis)).collect()
-        }
-        Motion::List => return None,
-    };
+    let motion = test.motion.as_mut()?;
+    motion.course.step /= thin;
+    let moved: String = motion.axes().iter().map(|axis| session.machine.axes[*axis].name.as_str()).collect();
     let stem = match candidate.station.bar() {
         Some(bar) => format!("{moved}{:.0}", bar.bar),
         None => moved,

@@ -10,7 +10,7 @@ use abbe_model::Diagnostic;
 use abbe_model::instrument::Station;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
-use abbe_model::session::{Session, Test, motion, planned};
+use abbe_model::session::{Session, Test, planned};
 use abbe_model::unit::Unit;
 
 /// Assumed pause between two tests, s.
@@ -27,8 +27,7 @@ pub fn complete(session: &Session, planned_only: bool) -> Result<Session, Diagno
     let mut clock_s = 0.0;
     let placed = start::stations(session, &session.tests);
     for (test, station) in complete.tests.iter_mut().zip(&placed) {
-        let moves = !matches!(test.motion, None | Some(motion::Motion::List));
-        if test.readings.is_none() || (planned_only && moves) {
+        if test.readings.is_none() || (planned_only && test.motion.is_some()) {
             let mut readings = planned(session, test, station)?;
             readings.time_s.iter_mut().for_each(|time| *time += clock_s);
             test.readings = Some(Arc::new(readings));

@@ -52,7 +52,6 @@ use abbe::files::{self, ReadOptions, SourceMap};
 use abbe::identify::plausibility::{self, Plausibility};
 use abbe::model::Diagnostic;
 use abbe::model::session::Session;
-use abbe::model::session::motion::Motion;
 use clap::{Args, Parser, Subcommand};
 use serde_json::Map;
 
@@ -179,7 +178,7 @@ impl SessionArguments {
     fn read_planned(&self, needs: impl Fn(&Session) -> bool) -> Result<(Session, SourceMap), Diagnostic> {
         let source = files::text(&self.session, "the session file")?;
         let (session, sources) = files::session_of(&source, &ReadOptions { read_data: false, ..self.options() })?;
-        if needs(&session) && session.tests.iter().any(|test| matches!(test.motion, None | Some(Motion::List))) {
+        if needs(&session) && session.tests.iter().any(|test| test.motion.is_none()) {
             return files::session_of(&source, &self.options());
         }
         Ok((session, sources))

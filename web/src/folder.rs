@@ -6,7 +6,6 @@ use abbe::document::Origin;
 use abbe::files::store::Store;
 use abbe::files::{self, ReadOptions, SourceMap};
 use abbe::model::session::Session;
-use abbe::model::session::motion::Motion;
 use serde_json::json;
 use wasm_bindgen::prelude::*;
 
@@ -48,7 +47,7 @@ impl Folder {
         let tests = read.session.tests.iter().map(|test| {
             let readings = test.readings.as_ref().map_or(0, |readings| readings.rows());
             // What the axes do without data, which a plan needs.
-            let moves = !matches!(test.motion, None | Some(Motion::List));
+            let moves = test.motion.is_some();
             json!({ "name": test.name, "readings": readings, "moves": moves })
         });
         let files: Vec<String> = read.sources.files.iter().map(|stamp| stamp.file.display().to_string()).collect();

@@ -23,7 +23,6 @@ pub mod program;
 
 use abbe_model::Diagnostic;
 use abbe_model::chain::Machine;
-use abbe_model::session::motion::Motion;
 use abbe_model::session::moves::Moves;
 use abbe_model::session::{Session, Test};
 use abbe_model::words::listed;
@@ -138,7 +137,7 @@ pub fn has_programs(session: &Session) -> bool {
 
 /// Whether a program can follow from what the session states of a test.
 fn states_motion(test: &Test) -> bool {
-    !matches!(test.motion, None | Some(Motion::List))
+    test.motion.is_some()
 }
 
 /// The programs of every test of a session, and `main`, which calls them. A test whose positions stand in its readings alone

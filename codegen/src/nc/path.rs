@@ -10,7 +10,7 @@ use abbe_model::chain::{BodyErrors, Machine};
 use abbe_model::frames::Point;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::session::Test;
-use abbe_model::session::motion::Motion;
+use abbe_model::session::motion::{Course, Motion, Moved, Traversals, length_of};
 use abbe_model::session::placing::balls;
 use abbe_model::session::planned::{planned, reaches};
 
@@ -34,8 +34,7 @@ pub(super) struct Path {
     pub legs: Vec<Leg>,
     /// Close states of each overshoot.
     pub overshoots: Vec<Vec<Vec<f64>>>,
-    pub runs: usize,
-    pub both_directions: bool,
+    pub traversals: Traversals,
     /// How long the axes rest at each target, s; `None` of an instrument that reads along the motion.
     pub rest_s: Option<f64>,
     /// The feed of the measured path and its unit.
@@ -69,36 +68,22 @@ impl Path {
     /// # Errors
     /// If the test has no motion, or an axis would leave its travel.
     pub fn of(machine: &Machine, test: &Test, control: &dyn Control, options: &NcOptions) -> Result<Path, Diagnostic> {
-        let (range, runs, both_directions) = match &test.motion {
-            Some(
-                Motion::Sweep { from, to, runs, both_directions, .. }
-                | Motion::Circle { from, to, runs, both_directions, .. }
-                | Motion::Line { from, to, runs, both_directions, .. }
-                | Motion::Follow { from, to, runs, both_directions, .. },
-            ) => ([*from, *to], *runs, *both_directions),
-            Some(Motion::List) | None => {
-                return Err(error::nc(
-                    format!("test \"{}\" states no motion", test.name),
-                    "add `sweep = { … }` or `path = { kind = \"circle\" | \"line\" | \"follow\", … }`",
-                ));
-            }
-        };
+        let motion = test.motion.as_ref().ok_or_else(|| {
+            error::nc(
+                format!("test \"{}\" states no motion", test.name),
+                "add `sweep = { … }` or `path = { kind = \"circle\" | \"line\" | \"follow\", … }`",
+            )
+        })?;
         reaches(machine, test).map_err(of_plan)?;
-        let feed = match &test.motion {
-            Some(Motion::Sweep { axis, speed, .. } | Motion::Follow { axis, speed, .. }) => {
-                let kind = machine.axes[*axis].kind;
-                (60.0 * kind.to_display(*speed), if kind == AxisKind::Rotary { "°/min" } else { "mm/min" })
-            }
-            Some(Motion::Circle { speed, .. } | Motion::Line { speed, .. }) => (60.0 * speed, "mm/min"),
-            _ => (0.0, ""),
-        };
+        let (speed, is_rotary) = motion.feed(machine);
+        let feed = (speed, if is_rotary { "°/min" } else { "mm/min" });
+        let Course { from, to, traversals, .. } = motion.course;
         let (mut remarks, mut warnings) = (Vec::new(), Vec::new());
-        let ends = overshot(machine, test, range, options, &mut warnings)?;
-        let [from, to] = range;
+        let ends = overshot(machine, test, motion, options, &mut warnings)?;
         let (mut legs, mut overshoots) = (Vec::new(), Vec::new());
         for (range, measured) in [([ends[0], from], false), ([from, to], true), ([to, ends[1]], false)] {
             if range[0] != range[1] {
-                legs.push(Leg::of(machine, test, range, measured, control, options)?);
+                legs.push(Leg::of(machine, (test, motion), range, measured, control, options)?);
                 if !measured {
                     overshoots.push(states(machine, test, range, OVERSHOOT_STEPS)?);
                 }
@@ -108,7 +93,7 @@ impl Path {
         if legs.iter().any(|leg| matches!(leg.shape, Shape::Segments { .. })) {
             remarks.push(format!("Segments with a chord error of at most {} um", options.chord_error_mm * 1e3));
         }
-        Ok(Path { legs, overshoots, runs, both_directions, rest_s, feed, remarks, warnings })
+        Ok(Path { legs, overshoots, traversals, rest_s, feed, remarks, warnings })
     }
 
     /// Number of states of the measured path at which the axes rest.
@@ -129,19 +114,9 @@ impl Path {
 
 /// The test with another range of its motion, traversed once with this many steps.
 fn with_range(test: &Test, range: [f64; 2], steps: usize) -> Test {
-    let mut test = test.clone();
-    let [new_from, new_to] = range;
-    if let Some(
-        Motion::Sweep { from, to, step, runs, both_directions, .. }
-        | Motion::Circle { from, to, step, runs, both_directions, .. }
-        | Motion::Line { from, to, step, runs, both_directions, .. }
-        | Motion::Follow { from, to, step, runs, both_directions, .. },
-    ) = &mut test.motion
-    {
-        (*from, *to, *step) = (new_from, new_to, (new_to - new_from).abs() / steps as f64);
-        (*runs, *both_directions) = (1, false);
-    }
-    test
+    let motion =
+        test.motion.as_ref().map(|motion| Motion { course: motion.course.once(range, steps), ..motion.clone() });
+    Test { motion, ..test.clone() }
 }
 
 fn of_plan(error: Diagnostic) -> Diagnostic {
@@ -159,17 +134,13 @@ fn states(machine: &Machine, test: &Test, range: [f64; 2], steps: usize) -> Resu
 fn overshot(
     machine: &Machine,
     test: &Test,
-    [from, to]: [f64; 2],
+    motion: &Motion,
     options: &NcOptions,
     warnings: &mut Vec<String>,
 ) -> Result<[f64; 2], Diagnostic> {
+    let Course { from, to, .. } = motion.course;
     let sign = (to - from).signum();
-    let driven = match &test.motion {
-        Some(Motion::Sweep { axis, .. } | Motion::Follow { axis, .. }) => Some(&machine.axes[*axis]),
-        _ => None,
-    };
-    let is_line = matches!(test.motion, Some(Motion::Line { .. }));
-    let linear = is_line || driven.is_some_and(|axis| axis.kind == AxisKind::Linear);
+    let linear = !motion.is_angular(machine);
     let full = !linear && (to - from).abs() > TAU - 1e-9;
     let stated = if linear { options.overshoot_mm } else { options.overshoot_deg.map(f64::to_radians) };
     let usual = match (linear, full) {
@@ -185,9 +156,9 @@ fn overshot(
         return reached.map(|_| whole);
     }
     // Less where the travel of the axis, or of an axis that follows it, ends.
-    let room = |end: f64, sign: f64| match &test.motion {
-        Some(Motion::Line { axes, ends, .. }) => room_on_line(machine, axes, ends, end, sign, wanted),
-        _ => driven.map_or(wanted, |axis| room_of(axis, end, sign, wanted)),
+    let room = |end: f64, sign: f64| match &motion.moved {
+        Moved::Line { axes, ends, .. } => room_on_line(machine, axes, ends, end, sign, wanted),
+        _ => motion.axis().map_or(wanted, |axis| room_of(&machine.axes[axis], end, sign, wanted)),
     };
     let less = with(room(from, -sign), room(to, sign));
     let range = if states(machine, test, less, 64).is_ok() { less } else { [from, to] };
@@ -213,7 +184,7 @@ fn room_of(axis: &Axis, end: f64, sign: f64, wanted: f64) -> f64 {
 
 /// How far a line can go beyond a distance along it, at most as far as wanted, mm.
 fn room_on_line(machine: &Machine, axes: &[usize], ends: &[[f64; 2]], at: f64, sign: f64, wanted: f64) -> f64 {
-    let length = ends.iter().map(|[start, end]| (end - start).powi(2)).sum::<f64>().sqrt();
+    let length = length_of(ends);
     axes.iter().zip(ends).fold(wanted, |least, (axis, [start, end])| {
         let rate = (end - start) / length;
         let position = start + rate * at;
@@ -224,7 +195,7 @@ fn room_on_line(machine: &Machine, axes: &[usize], ends: &[[f64; 2]], at: f64, s
 impl Leg {
     fn of(
         machine: &Machine,
-        test: &Test,
+        (test, motion): (&Test, &Motion),
         range: [f64; 2],
         measured: bool,
         control: &dyn Control,
@@ -232,26 +203,25 @@ impl Leg {
     ) -> Result<Leg, Diagnostic> {
         let span = (range[1] - range[0]).abs();
         let rest_s = (measured && test.station.handling().reads_at_rest).then_some(options.dwell_s);
-        let steps_of = |step: f64| (span / step).round().max(1.0) as usize;
-        let (speed, radius) = match &test.motion {
-            Some(Motion::Sweep { axis, step, speed, .. }) => {
-                let feed = 60.0 * machine.axes[*axis].kind.to_display(*speed);
-                let vertices = states(machine, test, range, rest_s.map_or(1, |_| steps_of(*step)))?;
+        let stated = (span / motion.course.step).round().max(1.0) as usize;
+        let (feed, _) = motion.feed(machine);
+        let radius = match &motion.moved {
+            Moved::Axis(_) => {
+                let vertices = states(machine, test, range, rest_s.map_or(1, |_| stated))?;
                 return Ok(Leg { vertices, measured, rest_s, shape: Shape::Line(feed) });
             }
-            Some(Motion::Line { step, speed, in_turn, .. }) => {
+            Moved::Line { in_turn, .. } => {
                 // Axes that move in turn leave the line at every step.
-                let steps = if *in_turn || rest_s.is_some() { steps_of(*step) } else { 1 };
+                let steps = if *in_turn || rest_s.is_some() { stated } else { 1 };
                 let vertices = states(machine, test, range, steps)?;
-                return Ok(Leg { vertices, measured, rest_s, shape: Shape::Line(60.0 * speed) });
+                return Ok(Leg { vertices, measured, rest_s, shape: Shape::Line(feed) });
             }
-            Some(Motion::Circle { first, second, radius, step, speed, .. }) => {
+            Moved::Circle { axes, radius, .. } => {
                 // Half a turn at most: a block with equal ends means nothing or a whole turn, as the control has it.
                 let least = (span / (0.9 * PI)).ceil().max(1.0) as usize;
-                let vertices = states(machine, test, range, rest_s.map_or(least, |_| steps_of(*step).max(least)))?;
+                let vertices = states(machine, test, range, rest_s.map_or(least, |_| stated.max(least)))?;
                 let whole = states(machine, test, [0.0, PI], 1);
-                let axes = [*first, *second];
-                if let (Some((plane, order)), Ok(whole)) = (plane(machine, axes), whole) {
+                if let (Some((plane, order)), Ok(whole)) = (plane(machine, *axes), whole) {
                     let centre = axes.map(|axis| 0.5 * (whole[0][axis] + whole[1][axis]));
                     let round = vertices.iter().all(|state| {
                         let [x, y] = [0, 1].map(|i| state[axes[i]] - centre[i]);
@@ -265,19 +235,18 @@ impl Leg {
                             axes: order.map(|i| axes[i]),
                             centre: order.map(|i| centre[i]),
                             counterclockwise: forward != swapped,
-                            feed: 60.0 * speed,
+                            feed,
                         };
                         return Ok(Leg { vertices, measured, rest_s, shape });
                     }
                 }
-                (*speed, *radius)
+                *radius
             }
-            Some(Motion::Follow { speed, .. }) => (*speed, 1.0),
-            _ => return Err(error::nc("no motion", "state one")),
+            Moved::Follow { .. } => 1.0,
         };
-        let mut steps = match (rest_s, &test.motion) {
-            (Some(_), Some(Motion::Circle { step, .. } | Motion::Follow { step, .. })) => steps_of(*step),
-            _ => (span / 2_f64.to_radians()).ceil().max(1.0) as usize,
+        let mut steps = match rest_s {
+            Some(_) => stated,
+            None => (span / 2_f64.to_radians()).ceil().max(1.0) as usize,
         };
         let vertices = loop {
             let vertices = states(machine, test, range, steps)?;
@@ -296,16 +265,15 @@ impl Leg {
                 ));
             }
         };
-        let seconds = span * radius / speed / (vertices.len() - 1) as f64;
-        let follows = matches!(test.motion, Some(Motion::Follow { .. }));
-        let vertices = match &test.motion {
-            Some(Motion::Follow { axis, .. }) => {
+        let seconds = span * radius / motion.course.speed / (vertices.len() - 1) as f64;
+        let vertices = match motion.axis() {
+            Some(axis) => {
                 let increment = 0.1_f64.powi(options.decimals(control) as i32);
-                on_the_grid(machine, test, *axis, vertices, increment)?
+                on_the_grid(machine, test, axis, vertices, increment)?
             }
-            _ => vertices,
+            None => vertices,
         };
-        let tool_points = (options.tool_point && follows)
+        let tool_points = (options.tool_point && motion.axis().is_some())
             .then(|| vertices.iter().map(|state| tool_over_table(machine, test, state)).collect());
         Ok(Leg { vertices, measured, rest_s, shape: Shape::Segments { seconds, tool_points } })
     }

@@ -301,11 +301,9 @@ impl Writer<'_> {
     }
 
     fn traversals(&self, path: &Path, blocks: &mut Vec<Block>) {
-        let count = path.runs * if path.both_directions { 2 } else { 1 };
-        for run in 0..count {
-            let back = path.both_directions && run % 2 == 1;
+        for (run, back) in path.traversals.are_backward().enumerate() {
             if run > 0 {
-                if !path.both_directions {
+                if !path.traversals.both_directions() {
                     blocks.push(Block::Comment("Back to the start; not a run".into()));
                     let back = path.legs.iter().rev();
                     back.for_each(|leg| blocks.extend(leg.through(&self.letters, self.machine, true)));
@@ -330,7 +328,7 @@ impl Writer<'_> {
 
     /// From where the traversals end: feed-out, and away along the tool.
     fn retreat(&self, path: &Path, start: &[f64], draft: &mut Draft) {
-        let end = if path.both_directions { start } else { path.end() };
+        let end = if path.traversals.both_directions() { start } else { path.end() };
         let ball_bar = self.test.station.bar().is_some();
         let last = self.fed_in(end).filter(|_| ball_bar).unwrap_or_else(|| end.to_vec());
         if last != end {

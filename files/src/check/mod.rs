@@ -9,7 +9,7 @@ pub(crate) mod setups;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::instrument::{Checked, Fault};
-use abbe_model::session::motion::Motion;
+use abbe_model::session::motion::{Course, Motion};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test, planned};
 use abbe_model::unit::Unit;
@@ -92,10 +92,10 @@ const NEAR_FACTOR: f64 = 0.1;
 
 /// A description of an axis whose positions span what the stated motion spans in another unit.
 fn of_another_unit(machine: &Machine, motion: Option<&Motion>, readings: &Readings) -> Option<String> {
-    let (Motion::Sweep { axis, from, to, .. } | Motion::Follow { axis, from, to, .. }) = motion? else { return None };
-    let positions = readings.positions[*axis].iter().copied();
+    let (axis, Course { from, to, .. }) = (motion?.axis()?, motion?.course);
+    let positions = readings.positions[axis].iter().copied();
     let span = positions.clone().fold(f64::NEG_INFINITY, f64::max) - positions.fold(f64::INFINITY, f64::min);
-    let axis = &machine.axes[*axis];
+    let axis = &machine.axes[axis];
     let (units, column): (&[(Unit, &str)], Unit) = match axis.kind {
         AxisKind::Rotary => (&[(Unit::Radian, "radians")], Unit::Degree),
         AxisKind::Linear => (&[(Unit::Metre, "metres"), (Unit::Inch, "inches")], Unit::Millimetre),

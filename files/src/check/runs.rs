@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use abbe_model::session::motion::Motion;
+use abbe_model::session::motion::{Motion, Moved};
 use abbe_model::session::readings::Readings;
 use abbe_model::words::counted;
 
@@ -13,19 +13,11 @@ const MIN_ADVANCE: f64 = 0.5;
 /// A description of the difference between the runs of the data and those of the stated motion, if any. Data without a
 /// `run` column are not compared.
 pub(super) fn difference_from_stated(motion: Option<&Motion>, readings: &Readings) -> Option<String> {
-    let (Motion::Sweep { runs, both_directions, .. }
-    | Motion::Circle { runs, both_directions, .. }
-    | Motion::Line { runs, both_directions, .. }
-    | Motion::Follow { runs, both_directions, .. }) = motion?
-    else {
-        return None;
-    };
-    if readings.run.is_empty() {
-        return None;
-    }
+    let motion = motion.filter(|_| !readings.run.is_empty())?;
+    let (runs, both_directions) = (motion.course.traversals.runs(), motion.course.traversals.both_directions());
     let (mut forward, mut backward, mut turning) = (0, 0, Vec::new());
     for run in readings.runs() {
-        let (net, whole) = advance_and_length(motion?, readings, &run);
+        let (net, whole) = advance_and_length(motion, readings, &run);
         if whole > 0.0 && net.abs() < MIN_ADVANCE * whole {
             turning.push(readings.run[run.start].to_string());
         } else if net > 0.0 {
@@ -46,8 +38,8 @@ pub(super) fn difference_from_stated(motion: Option<&Motion>, readings: &Reading
             ),
         });
     }
-    let enough = forward >= *runs && (backward >= *runs || !both_directions);
-    let only_forward = *both_directions || backward == 0;
+    let enough = forward >= runs && (backward >= runs || !both_directions);
+    let only_forward = both_directions || backward == 0;
     (!(enough && only_forward))
         .then(|| format!("the data contain {} forward and {backward} backward, but {states}", counted(forward, "run")))
 }
@@ -72,28 +64,28 @@ pub(super) fn missing_numbers(readings: &Readings) -> Option<String> {
 /// the swept area.
 fn advance_and_length(motion: &Motion, readings: &Readings, run: &Range<usize>) -> (f64, f64) {
     let sum = |steps: &mut dyn Iterator<Item = f64>| {
-        steps.fold((0.0, 0.0), |(net, whole), step| (net + step, whole + step.abs()))
+        let sense = motion.course.to - motion.course.from;
+        steps.map(|step| step * sense).fold((0.0, 0.0), |(net, whole), step| (net + step, whole + step.abs()))
     };
-    match motion {
-        Motion::Sweep { axis, from, to, .. } | Motion::Follow { axis, from, to, .. } => {
+    match &motion.moved {
+        Moved::Axis(axis) | Moved::Follow { axis, .. } => {
             let positions = &readings.positions[*axis][run.clone()];
-            sum(&mut positions.windows(2).map(|pair| (pair[1] - pair[0]) * (to - from)))
+            sum(&mut positions.windows(2).map(|pair| pair[1] - pair[0]))
         }
-        Motion::Circle { first, second, from, to, .. } => {
-            let [x, y] = [*first, *second].map(|axis| &readings.positions[axis][run.clone()]);
+        Moved::Circle { axes, .. } => {
+            let [x, y] = axes.map(|axis| &readings.positions[axis][run.clone()]);
             let area = |k: usize| (x[k] - x[0]) * (y[k + 1] - y[0]) - (x[k + 1] - x[0]) * (y[k] - y[0]);
-            sum(&mut (0..x.len() - 1).map(|k| area(k) * (to - from)))
+            sum(&mut (0..x.len() - 1).map(area))
         }
-        Motion::Line { axes, ends, from, to, .. } => {
+        Moved::Line { axes, ends, .. } => {
             let step = |k: usize| {
                 let way = axes.iter().zip(ends).map(|(axis, [start, end])| {
                     let positions = &readings.positions[*axis][run.clone()];
                     (positions[k + 1] - positions[k]) * (end - start)
                 });
-                way.sum::<f64>() * (to - from)
+                way.sum::<f64>()
             };
             sum(&mut (0..run.len() - 1).map(step))
         }
-        Motion::List => (0.0, 0.0),
     }
 }

@@ -13,7 +13,6 @@ use abbe_model::document::node::Node;
 use abbe_model::document::session::{Instrument, MachineFile, Session as Document, SessionMachine, Unknowns};
 use abbe_model::document::test::Test;
 use abbe_model::instrument::{Fault, InstrumentKind};
-use abbe_model::session::motion::Motion;
 use abbe_model::session::planned::checked_plan;
 use abbe_model::session::{Session, trajectory};
 
@@ -443,8 +442,7 @@ impl Draft {
 /// The axis that alone moves in a test, or that a machine alone has; of a machine with one rotary axis that one.
 fn moved(machine: &Machine, test: &abbe_model::session::Test) -> Option<usize> {
     match &test.motion {
-        Some(Motion::Sweep { axis, .. } | Motion::Follow { axis, .. }) => Some(*axis),
-        Some(_) => None,
+        Some(motion) => motion.axis(),
         None => only_axis(machine).or_else(|| {
             let mut rotary = (0..machine.axes.len()).filter(|k| machine.axes[*k].kind == AxisKind::Rotary);
             rotary.next().filter(|_| rotary.next().is_none())
@@ -454,8 +452,7 @@ fn moved(machine: &Machine, test: &abbe_model::session::Test) -> Option<usize> {
 
 /// The range of the planned positions of each axis, mm and rad.
 fn ranges(machine: &Machine, test: &abbe_model::session::Test) -> Option<Vec<[f64; 2]>> {
-    let moves = !matches!(test.motion, Some(Motion::List) | None);
-    let readings = checked_plan(machine, test).ok().filter(|_| moves)?;
+    let readings = checked_plan(machine, test).ok().filter(|_| test.motion.is_some())?;
     let range = |column: &Vec<f64>| {
         column.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], q| [low.min(*q), high.max(*q)])
     };

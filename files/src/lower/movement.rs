@@ -5,10 +5,12 @@ use abbe_model::document::fault::{Fault, Within};
 use abbe_model::document::movement as document;
 use abbe_model::document::node::Named;
 use abbe_model::document::schema;
-use abbe_model::document::value::{Count, Length, Positive};
+use abbe_model::document::value::{Length, Positive};
 use abbe_model::instrument::{Following, Station};
 use abbe_model::session::limits;
-use abbe_model::session::motion::{FollowOffset, MAX_READINGS, Motion, length_of, programmed_over_path_feed};
+use abbe_model::session::motion::{
+    Course, FollowOffset, MAX_READINGS, Motion, Moved, Traversals, length_of, programmed_over_path_feed,
+};
 
 use super::Context;
 use crate::axes;
@@ -52,17 +54,20 @@ pub(super) fn sweep(
     let step = end("step", document.step_mm, document.step_deg)?;
     let range = StepRange::new(from, to, step, &format!("step_{}", kind.unit()))?;
     let speed = speed(context, axis, station, document.feed_mm_min, document.feed_deg_min)?;
-    let (runs, both_directions) = runs_and_directions(document.runs, document.both_directions, range.steps())?;
-    Ok(Motion::Sweep { axis, from, to, step, speed, runs, both_directions })
+    Ok(Motion { moved: Moved::Axis(axis), course: range.course(speed, document.traversals, 1)? })
 }
 
-/// Several axes move together.
-pub(super) fn path(context: &Context<'_>, document: &document::Path, station: &Station<f64>) -> Result<Motion, Fault> {
+/// Several axes move together; `None` if the data contain the states.
+pub(super) fn path(
+    context: &Context<'_>,
+    document: &document::Path,
+    station: &Station<f64>,
+) -> Result<Option<Motion>, Fault> {
     match document {
-        document::Path::List(_) => Ok(Motion::List),
-        document::Path::Circle(circle) => self::circle(context, circle),
-        document::Path::Line(line) => self::line(context, line),
-        document::Path::Follow(follow) => self::follow(context, follow, station),
+        document::Path::List(_) => Ok(None),
+        document::Path::Circle(circle) => self::circle(context, circle).map(Some),
+        document::Path::Line(line) => self::line(context, line).map(Some),
+        document::Path::Follow(follow) => self::follow(context, follow, station).map(Some),
     }
 }
 
@@ -79,8 +84,8 @@ fn circle(context: &Context<'_>, document: &document::Circle) -> Result<Motion, 
         }
         Ok(axis)
     };
-    let (first, second) = (linear(first).within("plane")?, linear(second).within("plane")?);
-    if first == second {
+    let axes = [linear(first).within("plane")?, linear(second).within("plane")?];
+    if axes[0] == axes[1] {
         return Err(Fault::of_key(format!("= \"{plane}\" names one axis twice"), None).at("plane"));
     }
     let (_, radius) = document.radius_mm.evaluated("radius_mm", context.constants).within("radius_mm")?;
@@ -92,9 +97,8 @@ fn circle(context: &Context<'_>, document: &document::Circle) -> Result<Motion, 
     }
     let range = StepRange::turn(document.from_deg, document.to_deg, document.step_deg)?;
     let speed = document.feed_mm_min.map_or(DEFAULT_FEED_MM_S, |feed| feed.0 / 60.0);
-    let (runs, both_directions) = runs_and_directions(document.runs, document.both_directions, range.steps())?;
-    let StepRange { from, to, step } = range;
-    Ok(Motion::Circle { first, second, radius, centre, from, to, step, speed, runs, both_directions })
+    let moved = Moved::Circle { axes, radius, centre };
+    Ok(Motion { moved, course: range.course(speed, document.traversals, 1)? })
 }
 
 fn line(context: &Context<'_>, document: &document::Line) -> Result<Motion, Fault> {
@@ -146,10 +150,8 @@ fn line(context: &Context<'_>, document: &document::Line) -> Result<Motion, Faul
     let range = StepRange::new(0.0, length_of(&ends), document.step_mm, "step_mm")?;
     let in_turn = document.in_turn.unwrap_or(false);
     let speed = document.feed_mm_min.map_or(DEFAULT_FEED_MM_S, |feed| feed.0 / 60.0);
-    let steps = range.steps() * if in_turn { axes.len() as f64 } else { 1.0 };
-    let (runs, both_directions) = runs_and_directions(document.runs, document.both_directions, steps)?;
-    let StepRange { from, to, step } = range;
-    Ok(Motion::Line { axes, ends, from, to, step, speed, runs, both_directions, in_turn })
+    let course = range.course(speed, document.traversals, if in_turn { axes.len() } else { 1 })?;
+    Ok(Motion { moved: Moved::Line { axes, ends, in_turn }, course })
 }
 
 fn follow(context: &Context<'_>, document: &document::Follow, station: &Station<f64>) -> Result<Motion, Fault> {
@@ -184,9 +186,7 @@ fn follow(context: &Context<'_>, document: &document::Follow, station: &Station<
         Some(feed) => programmed_speed(context, axis, station, feed, document)?,
         None => speed(context, axis, station, document.feed_mm_min, document.feed_deg_min)?,
     };
-    let (runs, both_directions) = runs_and_directions(document.runs, document.both_directions, range.steps())?;
-    let StepRange { from, to, step } = range;
-    Ok(Motion::Follow { axis, from, to, step, speed, runs, both_directions, offset })
+    Ok(Motion { moved: Moved::Follow { axis, offset }, course: range.course(speed, document.traversals, 1)? })
 }
 
 fn moved_axis(context: &Context<'_>, name: &str) -> Result<(usize, AxisKind), Fault> {
@@ -231,6 +231,17 @@ impl StepRange {
 
     fn steps(&self) -> f64 {
         (self.to - self.from).abs() / self.step + 1e-6
+    }
+
+    /// The course through the range, with so many readings at each step.
+    fn course(self, speed: f64, traversals: Traversals, readings: usize) -> Result<Course, Fault> {
+        let (runs, steps) = (traversals.runs(), self.steps() * readings as f64);
+        if traversals.runs.is_some() && runs as f64 * (steps + 1.0) * 2.0 > MAX_READINGS as f64 {
+            let message = format!("{runs} runs of {steps:.0} steps; the limit is {MAX_READINGS} readings");
+            return Err(Fault::new(message, None).at("runs"));
+        }
+        let StepRange { from, to, step } = self;
+        Ok(Course { from, to, step, speed, traversals })
     }
 }
 
@@ -295,19 +306,4 @@ fn radius_about(axis: &Axis, point: [f64; 3]) -> f64 {
     let along: f64 = (0..3).map(|i| from[i] * axis.direction[i]).sum();
     let square: f64 = from.iter().map(|x| x * x).sum::<f64>() - along * along;
     square.max(0.0).sqrt()
-}
-
-/// The number of runs, and whether each has both directions; the default is one run in both directions.
-fn runs_and_directions(
-    runs: Option<Count<1, MAX_READINGS>>,
-    both: Option<bool>,
-    steps: f64,
-) -> Result<(usize, bool), Fault> {
-    if let Some(Count(runs)) = runs
-        && runs as f64 * (steps + 1.0) * 2.0 > MAX_READINGS as f64
-    {
-        let message = format!("{runs} runs of {steps:.0} steps; the limit is {MAX_READINGS} readings");
-        return Err(Fault::new(message, None).at("runs"));
-    }
-    Ok((runs.map_or(1, |Count(runs)| runs), both.unwrap_or(true)))
 }

@@ -13,7 +13,6 @@ use abbe_model::instrument::set_up::SetUp;
 use abbe_model::instrument::{InstrumentKind, Station, kinds};
 use abbe_model::session::contributors::Contributors;
 use abbe_model::session::expression::Length;
-use abbe_model::session::motion::Motion;
 use abbe_model::session::{Test, planned};
 use abbe_model::unit::Unit;
 use abbe_model::words::with_article;
@@ -49,12 +48,12 @@ pub(super) fn tests(
             return Err(Fault::new(message, help).on_key().at("path"));
         }
         (Some(sweep), None) => Some(movement::sweep(context, sweep, &station).within("sweep")?),
-        (None, Some(path)) => Some(movement::path(context, path, &station).within("path")?),
+        (None, Some(path)) => movement::path(context, path, &station).within("path")?,
         (None, None) => None,
     };
     let contributors = document.contributors.map(|of| contributors(of, &station).within("contributors")).transpose()?;
     let is_measured = document.data.is_some() || matches!(context.data, Data::Columns([_, ..]));
-    if !is_measured && matches!(motion, None | Some(Motion::List)) {
+    if !is_measured && motion.is_none() {
         let help = "add `data = \"….csv\"`, or the motion of the axes: `sweep = { … }` or `path = { … }`";
         return Err(Fault::of_table("has neither data nor a motion", help));
     }

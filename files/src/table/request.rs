@@ -88,12 +88,7 @@ impl Request<'_> {
     }
 
     /// Axes that move in the planned test: those that its motion names.
-    pub fn moved(&self) -> Vec<usize> {
-        match &self.test.motion {
-            Some(Motion::Sweep { axis, .. } | Motion::Follow { axis, .. }) => vec![*axis],
-            Some(Motion::Circle { first, second, .. }) => vec![*first, *second],
-            Some(Motion::Line { axes, .. }) => axes.clone(),
-            Some(Motion::List) | None => Vec::new(),
-        }
+    pub fn moved(&self) -> &[usize] {
+        self.test.motion.as_ref().map_or(&[], Motion::axes)
     }
 }

@@ -2,7 +2,7 @@
 
 use abbe_model::instrument::Fault;
 use abbe_model::instrument::column::Quantity;
-use abbe_model::session::motion::Motion;
+use abbe_model::session::motion::{Motion, Moved};
 
 use super::columns::{Column, Role, known, listed};
 use super::request::Request;
@@ -23,10 +23,8 @@ pub(super) fn required(request: &Request<'_>, columns: &[Column], header: Option
         return missing(what, help);
     }
     let moved = request.moved();
-    let on_circle = match &request.test.motion {
-        Some(Motion::Circle { first, second, .. }) => Some([*first, *second]),
-        _ => None,
-    };
+    let motion = request.test.motion.as_ref();
+    let on_circle = motion.filter(|motion| matches!(motion.moved, Moved::Circle { .. })).map(Motion::axes);
     let by_angle = has(&|role| matches!(role, Role::Polar(_)));
     if by_angle && on_circle.is_none() {
         let help = "state the circle: `path = { kind = \"circle\", plane = \"XY\", radius_mm = 100, … }`";

@@ -7,19 +7,17 @@
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::session::Test;
-use abbe_model::session::motion::{FollowOffset, Motion};
+use abbe_model::session::motion::{FollowOffset, Moved};
 
 /// The name of the motion of a test.
 pub(super) fn iso_10791_6(machine: &Machine, test: &Test) -> Option<&'static str> {
-    let Some(Motion::Follow { axis, .. }) = &test.motion else {
-        return None;
-    };
+    let Moved::Follow { axis, .. } = test.motion.as_ref()?.moved else { return None };
     let rotary = machine.axes.iter().enumerate().filter(|(_, axis)| axis.kind == AxisKind::Rotary);
     let on_table = rotary.map(|(index, _)| index < machine.workpiece_side).collect::<Vec<bool>>();
     if on_table != [true, true] {
         return None;
     }
-    match machine.axes[*axis].name.as_str() {
+    match machine.axes[axis].name.as_str() {
         "A" | "B" => Some("BK1"),
         "C" => Some("BK2"),
         _ => None,
@@ -28,10 +26,11 @@ pub(super) fn iso_10791_6(machine: &Machine, test: &Test) -> Option<&'static str
 
 /// The direction of the bar in a synchronous motion.
 pub(super) fn bar_direction(test: &Test) -> Option<&'static str> {
-    match &test.motion {
-        Some(Motion::Follow { offset: FollowOffset::Radial, .. }) => Some("radial"),
-        Some(Motion::Follow { offset: FollowOffset::Tangential, .. }) => Some("tangential"),
-        Some(Motion::Follow { offset: FollowOffset::Axial, .. }) => Some("axial"),
-        _ => None,
+    let Moved::Follow { offset, .. } = test.motion.as_ref()?.moved else { return None };
+    match offset {
+        FollowOffset::Radial => Some("radial"),
+        FollowOffset::Tangential => Some("tangential"),
+        FollowOffset::Axial => Some("axial"),
+        FollowOffset::None | FollowOffset::Touching => None,
     }
 }

@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 
-use serde::de::value::{F64Deserializer, MapAccessDeserializer, StrDeserializer, StringDeserializer};
+use serde::de::value::{F64Deserializer, StrDeserializer, StringDeserializer};
 use serde::de::{self, DeserializeSeed, Deserializer, Expected, IntoDeserializer, MapAccess, SeqAccess, Visitor};
 
 use serde::{Deserialize, forward_to_deserialize_any};
@@ -227,17 +227,11 @@ impl<'de> Deserializer<'de> for De<'de> {
 
     fn deserialize_struct<V: Visitor<'de>>(
         self,
-        _: &'static str,
+        name: &'static str,
         fields: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Fault> {
-        let mut map = Map::all(self.entries()?);
-        if fields.contains(&REST) {
-            let is_own = |entry: &&Entry| fields.contains(&entry.key.as_str());
-            map.rest = Some(map.entries.iter().copied().filter(|entry| !is_own(entry)).collect());
-            map.entries.retain(is_own);
-        }
-        visitor.visit_map(map)
+        Map::all(self.entries()?).deserialize_struct(name, fields, visitor)
     }
 
     /// A word, or a table whose key `kind` is the word. A table that has a variant's name as a key is that variant; the
@@ -271,7 +265,7 @@ impl<'de> Deserializer<'de> for De<'de> {
         let variant = word.ok_or_else(|| Fault::unexpected(expected()).at("kind"))?;
         let mut map = Map::all(entries);
         map.entries.retain(|entry| entry.key != "kind");
-        map.also = Some("kind");
+        map.also.push("kind");
         visitor.visit_enum(Variant { variant, map })
     }
 
@@ -326,15 +320,40 @@ struct Map<'de> {
     entries: VecDeque<&'de Entry>,
     value: Option<&'de Entry>,
     /// The keys that the struct does not name.
-    rest: Option<Vec<&'de Entry>>,
-    /// A key that was read before.
-    also: Option<&'static str>,
+    rest: Option<Box<Map<'de>>>,
+    /// Keys of the table that are read elsewhere.
+    also: Vec<&'static str>,
 }
 
 impl<'de> Map<'de> {
     fn all(entries: &'de [Entry]) -> Map<'de> {
-        Map { entries: entries.iter().collect(), value: None, rest: None, also: None }
+        Map { entries: entries.iter().collect(), value: None, rest: None, also: Vec::new() }
     }
+}
+
+impl<'de> Deserializer<'de> for Map<'de> {
+    type Error = Fault;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        visitor.visit_map(self)
+    }
+
+    fn deserialize_struct<V: Visitor<'de>>(
+        mut self,
+        _: &'static str,
+        fields: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Fault> {
+        if fields.contains(&REST) {
+            let (own, rest) = self.entries.iter().partition(|entry| fields.contains(&entry.key.as_str()));
+            let also = self.also.iter().chain(fields).copied().collect();
+            self.rest = Some(Box::new(Map { entries: rest, value: None, rest: None, also }));
+            self.entries = own;
+        }
+        visitor.visit_map(self)
+    }
+
+    forward_to_deserialize_any! { bool f32 f64 i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 char str string bytes byte_buf option unit unit_struct newtype_struct seq tuple tuple_struct map enum identifier ignored_any }
 }
 
 impl<'de> MapAccess<'de> for Map<'de> {
@@ -348,20 +367,22 @@ impl<'de> MapAccess<'de> for Map<'de> {
             None => return Ok(None),
         };
         let key: StrDeserializer<'_, Fault> = key.into_deserializer();
-        seed.deserialize(key).map(Some).map_err(|fault| fault.also_known(self.also.map(str::to_string)))
+        seed.deserialize(key).map(Some).map_err(|fault| fault.also_known(self.also.iter().map(ToString::to_string)))
     }
 
     fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, Fault> {
-        match self.value.take() {
-            Some(entry) => within_limits(&entry.key, &entry.node)
-                .and_then(|()| seed.deserialize(De(&entry.node, MAX_ITEMS)))
-                .within(&entry.key),
-            None => {
-                let entries: VecDeque<&Entry> = self.rest.take().unwrap_or_default().into();
-                not_too_many(entries.len(), MAX_ITEMS)?;
-                let rest = Map { entries, value: None, rest: None, also: None };
-                seed.deserialize(MapAccessDeserializer::new(rest))
+        match (self.value.take(), self.rest.take()) {
+            (Some(entry), rest) => {
+                self.rest = rest;
+                within_limits(&entry.key, &entry.node)
+                    .and_then(|()| seed.deserialize(De(&entry.node, MAX_ITEMS)))
+                    .within(&entry.key)
             }
+            (None, Some(rest)) => {
+                not_too_many(rest.entries.len(), MAX_ITEMS)?;
+                seed.deserialize(*rest)
+            }
+            (None, None) => Err(Fault::unexpected("a key")),
         }
     }
 }
@@ -428,7 +449,7 @@ impl<'de> de::VariantAccess<'de> for Map<'de> {
     }
 
     fn newtype_variant_seed<T: DeserializeSeed<'de>>(self, seed: T) -> Result<T::Value, Fault> {
-        seed.deserialize(MapAccessDeserializer::new(self))
+        seed.deserialize(self)
     }
 
     fn tuple_variant<V: Visitor<'de>>(self, _: usize, _: V) -> Result<V::Value, Fault> {

@@ -4,12 +4,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, Serializer};
 
 use super::node::Named;
-use super::value::{Count, Length, Point, Positive};
-use crate::session::motion::{FollowOffset, MAX_READINGS};
+use super::value::{Length, Point, Positive};
+use crate::session::motion::{FollowOffset, Traversals};
 
 /// One axis moves.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename = "sweep", deny_unknown_fields)]
+#[serde(rename = "sweep")]
+#[schemars(deny_unknown_fields)]
 pub struct Sweep {
     /// The axis that moves.
     pub axis: String,
@@ -31,10 +32,10 @@ pub struct Sweep {
     pub feed_mm_min: Option<Positive>,
     /// Speed of a rotary axis.
     pub feed_deg_min: Option<Positive>,
-    /// Number of runs; default 1.
-    pub runs: Option<Count<1, MAX_READINGS>>,
-    /// Whether each run has a forward and a backward traversal; default true.
-    pub both_directions: Option<bool>,
+    /// How often it is traversed.
+    #[serde(rename = "$rest", default)]
+    #[schemars(flatten)]
+    pub traversals: Traversals,
 }
 
 /// Several axes move together.
@@ -80,8 +81,8 @@ pub struct List {}
 
 /// Two linear axes move on a circle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename = "circle", deny_unknown_fields)]
-#[schemars(inline)]
+#[serde(rename = "circle")]
+#[schemars(inline, deny_unknown_fields)]
 pub struct Circle {
     /// The two linear axes, such as "XY".
     pub plane: String,
@@ -98,16 +99,16 @@ pub struct Circle {
     pub step_deg: f64,
     /// Feed along the path.
     pub feed_mm_min: Option<Positive>,
-    /// Number of runs; default 1.
-    pub runs: Option<Count<1, MAX_READINGS>>,
-    /// Whether each run has a forward and a backward traversal; default true.
-    pub both_directions: Option<bool>,
+    /// How often it is traversed.
+    #[serde(rename = "$rest", default)]
+    #[schemars(flatten)]
+    pub traversals: Traversals,
 }
 
 /// Linear axes move on a line, such as a diagonal of their travels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename = "line", deny_unknown_fields)]
-#[schemars(inline)]
+#[serde(rename = "line")]
+#[schemars(inline, deny_unknown_fields)]
 pub struct Line {
     /// Positions of the axes that move at the start: x_mm, y_mm.
     pub from: Named<Length>,
@@ -121,16 +122,16 @@ pub struct Line {
     pub in_turn: Option<bool>,
     /// Feed along the path.
     pub feed_mm_min: Option<Positive>,
-    /// Number of runs; default 1.
-    pub runs: Option<Count<1, MAX_READINGS>>,
-    /// Whether each run has a forward and a backward traversal; default true.
-    pub both_directions: Option<bool>,
+    /// How often it is traversed.
+    #[serde(rename = "$rest", default)]
+    #[schemars(flatten)]
+    pub traversals: Traversals,
 }
 
 /// A rotary axis turns and the linear axes keep the tool at the point of the table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename = "follow", deny_unknown_fields)]
-#[schemars(inline)]
+#[serde(rename = "follow")]
+#[schemars(inline, deny_unknown_fields)]
 pub struct Follow {
     /// The rotary axis that moves.
     pub axis: String,
@@ -149,8 +150,8 @@ pub struct Follow {
     pub feed_deg_min: Option<Positive>,
     /// Programmed feed F of a control that treats a degree as a millimetre.
     pub programmed_feed_mm_min: Option<Positive>,
-    /// Number of runs; default 1.
-    pub runs: Option<Count<1, MAX_READINGS>>,
-    /// Whether each run has a forward and a backward traversal; default true.
-    pub both_directions: Option<bool>,
+    /// How often it is traversed.
+    #[serde(rename = "$rest", default)]
+    #[schemars(flatten)]
+    pub traversals: Traversals,
 }

@@ -6,7 +6,7 @@ use super::machine::{Axis, Machine};
 use super::movement::{Circle, Follow, Line, Path, Sweep};
 use super::node::Named;
 use super::test::Test;
-use super::value::{Count, Length, Positive, Three};
+use super::value::{Positive, Three};
 use crate::axis::AxisKind;
 use crate::driver::DriverUnit;
 use crate::effect::keys::KeyWriter;
@@ -15,7 +15,7 @@ use crate::frames::Rotation;
 use crate::instrument::set_up::rounded;
 use crate::instrument::{InstrumentKind, SharedBy};
 use crate::session::Test as DomainTest;
-use crate::session::motion::{FollowOffset, Motion};
+use crate::session::motion::{Course, FollowOffset, Motion, Moved};
 use crate::unit::Unit;
 use crate::{axis, chain};
 
@@ -85,7 +85,8 @@ pub fn effect(effect: &Effect, machine: &chain::Machine) -> effect::Effect {
 /// A planned test of a session with this instrument, with the positions of the axes that it does not move. `None` for a test
 /// without a motion of its own.
 pub fn test(test: &DomainTest, machine: &chain::Machine, instrument: InstrumentKind) -> Option<Test> {
-    let (moved, sweep, path) = motion(test.motion.as_ref()?, machine)?;
+    let moved = test.motion.as_ref()?;
+    let (sweep, path) = motion(moved, machine);
     let mut set_up = test.station.written(&test.priors)?;
     let kind = test.station.kind();
     let stated = |set_up: &String, default: &str| (set_up != default).then(|| set_up.clone());
@@ -95,11 +96,16 @@ pub fn test(test: &DomainTest, machine: &chain::Machine, instrument: InstrumentK
     if let Some(socket) = &test.socket {
         set_up.set("socket", socket.as_str());
     }
+    let follows = |axis: usize| match moved.moved {
+        // A tool without a bar stays where it is over the table at the start.
+        Moved::Follow { offset, .. } => offset != FollowOffset::None && machine.axes[axis].kind == AxisKind::Linear,
+        _ => false,
+    };
     let held = (0..machine.axes.len())
-        .filter(|axis| !moved.contains(axis))
+        .filter(|axis| !moved.axes().contains(axis) && !follows(*axis))
         .map(|axis| (axis, rounded(machine.axes[axis].kind.to_display(test.at[axis]))))
         .filter(|(_, position)| *position != 0.0)
-        .map(|(axis, position)| (machine.axes[axis].column(""), Length::Number(position)));
+        .map(|(axis, position)| (machine.axes[axis].column(""), position.into()));
     Some(Test {
         name: test.name.clone(),
         set_up,
@@ -114,38 +120,19 @@ pub fn test(test: &DomainTest, machine: &chain::Machine, instrument: InstrumentK
     })
 }
 
-/// The axes whose positions follow from a motion, and its document.
-fn motion(motion: &Motion, machine: &chain::Machine) -> Option<(Vec<usize>, Option<Sweep>, Option<Path>)> {
+/// The document of a motion: `sweep` or `path`.
+fn motion(Motion { moved, course }: &Motion, machine: &chain::Machine) -> (Option<Sweep>, Option<Path>) {
+    let Course { from, to, step, speed, traversals } = *course;
     let name = |axis: usize| machine.axes[axis].name.clone();
     let degrees = |angle: f64| rounded(angle.to_degrees());
-    let often = |runs: usize| Some(Count(runs));
-    if let Motion::Line { axes, ends, .. } = motion {
-        let at = |end: usize| {
-            let named = axes
-                .iter()
-                .zip(ends)
-                .map(|(axis, ends)| (machine.axes[*axis].column(""), Length::Number(rounded(ends[end]))));
-            Named(named.collect())
-        };
-        let (from, to) = (at(0), at(1));
-        let Motion::Line { step, speed, runs, both_directions, in_turn, .. } = *motion else { return None };
-        let line = Line {
-            from,
-            to,
-            step_mm: rounded(step),
-            in_turn: in_turn.then_some(true),
-            feed_mm_min: Some(Positive(rounded(60.0 * speed))),
-            runs: often(runs),
-            both_directions: Some(both_directions),
-        };
-        return Some((axes.clone(), None, Some(Path::Line(line))));
-    }
-    Some(match *motion {
-        Motion::Sweep { axis, from, to, step, speed, runs, both_directions } => {
-            let kind = machine.axes[axis].kind;
+    let feed_mm_min = Some(Positive(rounded(60.0 * speed)));
+    let (from_deg, to_deg, step_deg) = (Some(degrees(from)), Some(degrees(to)), degrees(step));
+    let path = match moved {
+        Moved::Axis(axis) => {
+            let kind = machine.axes[*axis].kind;
             let in_unit = |of: AxisKind, value: f64| (kind == of).then(|| rounded(kind.to_display(value)));
             let sweep = Sweep {
-                axis: name(axis),
+                axis: name(*axis),
                 from_mm: in_unit(AxisKind::Linear, from),
                 from_deg: in_unit(AxisKind::Rotary, from),
                 to_mm: in_unit(AxisKind::Linear, to),
@@ -154,45 +141,47 @@ fn motion(motion: &Motion, machine: &chain::Machine) -> Option<(Vec<usize>, Opti
                 step_deg: in_unit(AxisKind::Rotary, step),
                 feed_mm_min: in_unit(AxisKind::Linear, speed * 60.0).map(Positive),
                 feed_deg_min: in_unit(AxisKind::Rotary, speed * 60.0).map(Positive),
-                runs: often(runs),
-                both_directions: Some(both_directions),
+                traversals,
             };
-            (vec![axis], Some(sweep), None)
+            return (Some(sweep), None);
         }
-        Motion::Circle { first, second, radius, centre, from, to, step, speed, runs, both_directions } => {
-            let circle = Circle {
-                plane: format!("{}{}", machine.axes[first].name, machine.axes[second].name),
-                radius_mm: Length::Number(rounded(radius)),
-                centre_mm: Some(Three(centre.map(|mm| Length::Number(rounded(mm))))),
-                from_deg: Some(degrees(from)),
-                to_deg: Some(degrees(to)),
-                step_deg: degrees(step),
-                feed_mm_min: Some(Positive(rounded(60.0 * speed))),
-                runs: often(runs),
-                both_directions: Some(both_directions),
+        Moved::Circle { axes, radius, centre } => Path::Circle(Circle {
+            plane: axes.map(name).concat(),
+            radius_mm: rounded(*radius).into(),
+            centre_mm: Some(Three(centre.map(|mm| rounded(mm).into()))),
+            from_deg,
+            to_deg,
+            step_deg,
+            feed_mm_min,
+            traversals,
+        }),
+        Moved::Line { axes, ends, in_turn } => {
+            let positions = |end: usize| {
+                let of_axis =
+                    |(axis, ends): (&usize, &[f64; 2])| (machine.axes[*axis].column(""), rounded(ends[end]).into());
+                Named(axes.iter().zip(ends).map(of_axis).collect())
             };
-            (vec![first, second], None, Some(Path::Circle(circle)))
+            Path::Line(Line {
+                from: positions(0),
+                to: positions(1),
+                step_mm: rounded(step),
+                in_turn: in_turn.then_some(true),
+                feed_mm_min,
+                traversals,
+            })
         }
-        Motion::Follow { axis, from, to, step, speed, runs, both_directions, offset } => {
+        Moved::Follow { axis, offset } => Path::Follow(Follow {
+            axis: name(*axis),
             // An instrument without a bar has no direction of it.
-            let bar = Some(offset).filter(|offset| !matches!(offset, FollowOffset::None | FollowOffset::Touching));
-            let follow = Follow {
-                axis: name(axis),
-                offset: bar,
-                from_deg: Some(degrees(from)),
-                to_deg: Some(degrees(to)),
-                step_deg: degrees(step),
-                feed_mm_min: None,
-                feed_deg_min: Some(Positive(degrees(60.0 * speed))),
-                programmed_feed_mm_min: None,
-                runs: often(runs),
-                both_directions: Some(both_directions),
-            };
-            let linear = (0..machine.axes.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Linear);
-            // The linear axes follow from the balls, but for a tool that stays where it is over the table at the start.
-            let follows = linear.filter(|_| offset != FollowOffset::None);
-            (std::iter::once(axis).chain(follows).collect(), None, Some(Path::Follow(follow)))
-        }
-        Motion::Line { .. } | Motion::List => return None,
-    })
+            offset: Some(*offset).filter(|offset| !matches!(offset, FollowOffset::None | FollowOffset::Touching)),
+            from_deg,
+            to_deg,
+            step_deg,
+            feed_mm_min: None,
+            feed_deg_min: Some(Positive(degrees(60.0 * speed))),
+            programmed_feed_mm_min: None,
+            traversals,
+        }),
+    };
+    (None, Some(path))
 }

@@ -1,6 +1,6 @@
 //! Planned states of tests: positions, runs and times that follow from their motions, within the travel of the axes.
 
-use super::motion::Motion;
+use super::motion::{Motion, Moved};
 use super::readings::Readings;
 use super::{Session, Test, trajectory};
 use crate::Diagnostic;
@@ -64,18 +64,15 @@ pub fn planned_session(session: &Session) -> Result<Vec<Readings>, Diagnostic> {
 
 /// As [`planned`], with an error as message and help.
 pub fn checked_plan(machine: &Machine, test: &Test) -> Result<Readings, (String, String)> {
-    let mut readings = match &test.motion {
-        Some(Motion::List) | None => {
-            let Some(data) = &test.readings else {
-                return Err((
-                    format!("test \"{}\" has neither a motion nor data from which its states follow", test.name),
-                    "add `sweep = { … }` or `path = { … }`, or read its data".into(),
-                ));
-            };
-            return Ok(Readings::clone(data));
-        }
-        Some(motion) => trajectory::states(machine, test, motion)?,
+    let Some(motion) = &test.motion else {
+        return test.readings.as_deref().cloned().ok_or_else(|| {
+            (
+                format!("test \"{}\" has neither a motion nor data from which its states follow", test.name),
+                "add `sweep = { … }` or `path = { … }`, or read its data".into(),
+            )
+        });
     };
+    let mut readings = trajectory::states(machine, test, motion)?;
     readings.channels = test.station.channels().len();
     readings.observed = vec![0.0; readings.rows() * readings.channels];
     match beyond_travel(machine, &readings) {
@@ -114,18 +111,15 @@ pub fn centre_circle(
     listed: &[bool],
     at: &mut [f64],
 ) {
-    if let (Some(pair), Some(Motion::Circle { first, second, centre, .. })) =
-        (trajectory::bar_between_points(station), motion)
-    {
-        let open: Vec<usize> = trajectory::linear_axes(machine)
-            .into_iter()
-            .filter(|axis| !listed[*axis] || axis == first || axis == second)
-            .collect();
-        let placed = trajectory::solve_linear_axes(machine, &pair, at, &open, *centre);
-        for axis in open {
-            if axis != *first && axis != *second {
-                at[axis] = placed.0[axis];
-            }
-        }
+    let circle = motion.and_then(|Motion { moved, .. }| match moved {
+        Moved::Circle { axes, centre, .. } => Some((axes, centre)),
+        _ => None,
+    });
+    let (Some(pair), Some((axes, centre))) = (trajectory::bar_between_points(station), circle) else { return };
+    let is_open = |axis: &usize| !listed[*axis] || axes.contains(axis);
+    let open: Vec<usize> = trajectory::linear_axes(machine).into_iter().filter(is_open).collect();
+    let (placed, _) = trajectory::solve_linear_axes(machine, &pair, at, &open, *centre);
+    for axis in open.into_iter().filter(|axis| !axes.contains(axis)) {
+        at[axis] = placed[axis];
     }
 }

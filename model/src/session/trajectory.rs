@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::Test;
-use super::motion::{FollowOffset, Motion, length_of};
+use super::motion::{FollowOffset, Motion, Moved, Traversals, length_of};
 use super::readings::Readings;
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, BodyErrors, Machine};
@@ -23,33 +23,26 @@ const POSITION_TOLERANCE_MM: f64 = 1e-6;
 type Fault = (String, String);
 
 /// Positions, runs and times of a motion.
-pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<Readings, Fault> {
-    match motion {
-        Motion::Sweep { axis, from, to, step, speed, runs, both_directions } => {
-            let along = steps(*from, *to, *step);
-            traversals(machine, &along, *speed, *runs, *both_directions, |q| {
-                let mut at = test.at.clone();
-                at[*axis] = q;
-                Ok(at)
-            })
+pub(super) fn states(machine: &Machine, test: &Test, Motion { moved, course }: &Motion) -> Result<Readings, Fault> {
+    let along = course.positions();
+    let traversed = |way: &[f64], speed: f64, state: &mut dyn FnMut(f64) -> Result<Vec<f64>, Fault>| {
+        traversals(machine, way, speed, course.traversals, state)
+    };
+    match moved {
+        Moved::Axis(axis) => traversed(&along, course.speed, &mut |q| {
+            let mut at = test.at.clone();
+            at[*axis] = q;
+            Ok(at)
+        }),
+        Moved::Circle { axes, radius, centre } => {
+            let circle = Circle::new(machine, &bar_of(&test.station), &test.at, *axes, *centre)?;
+            traversed(&along, course.speed / radius, &mut |angle| Ok(circle.state(*radius, angle)))
         }
-        Motion::Circle { first, second, radius, centre, from, to, step, speed, runs, both_directions } => {
-            let bar = bar_between_points(&test.station).unwrap_or(BallBar {
-                workpiece_ball: [0.0; 3],
-                spindle_ball: [0.0; 3],
-                bar: 0.0,
-            });
-            let circle = Circle::new(machine, &bar, &test.at, [*first, *second], *centre)?;
-            let along = steps(*from, *to, *step);
-            let turn = *speed / *radius;
-            traversals(machine, &along, turn, *runs, *both_directions, |angle| Ok(circle.state(*radius, angle)))
-        }
-        Motion::Line { axes, ends, from, to, step, speed, runs, both_directions, in_turn } => {
-            let along = steps(*from, *to, *step);
+        Moved::Line { axes, ends, in_turn } => {
             let (way, mut states) = on_line(&test.at, axes, ends, &along, *in_turn);
-            traversals(machine, &way, *speed, *runs, *both_directions, |_| Ok(states.next().unwrap_or_default()))
+            traversed(&way, course.speed, &mut |_| Ok(states.next().unwrap_or_default()))
         }
-        Motion::Follow { axis, from, to, step, speed, runs, both_directions, offset } => {
+        Moved::Follow { axis, offset } => {
             let Some(mut bar) = bar_between_points(&test.station) else {
                 return Err((
                     format!("test \"{}\" has no point of the table to follow", test.name),
@@ -60,8 +53,7 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
                 bar.workpiece_ball = table_point_at_tool(machine, &bar, &test.at);
             }
             let linear = linear_axes(machine);
-            let along = steps(*from, *to, *step);
-            traversals(machine, &along, *speed, *runs, *both_directions, |q| {
+            traversed(&along, course.speed, &mut |q| {
                 let mut at = test.at.clone();
                 at[*axis] = q;
                 let requested = offset_vector(machine, &bar, &at, *axis, *offset)?;
@@ -81,7 +73,6 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
                 Ok(state)
             })
         }
-        Motion::List => Ok(Readings::default()),
     }
 }
 
@@ -123,6 +114,11 @@ pub(super) fn bar_between_points(station: &Station<f64>) -> Option<BallBar<f64>>
     })
 }
 
+/// The same; both points at the origin of their frames for an instrument without them.
+fn bar_of(station: &Station<f64>) -> BallBar<f64> {
+    bar_between_points(station).unwrap_or(BallBar { workpiece_ball: [0.0; 3], spindle_ball: [0.0; 3], bar: 0.0 })
+}
+
 /// The point of the table frame at the tool point.
 fn table_point_at_tool(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> [f64; 3] {
     let state = machine.axis_positions(at);
@@ -131,29 +127,19 @@ fn table_point_at_tool(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> [f6
     machine.table_point::<f64>(&state, &none, tool).0
 }
 
-/// `from`, `from + step`, … up to `to`.
-fn steps(from: f64, to: f64, step: f64) -> Vec<f64> {
-    let ratio = (to - from).abs() / step;
-    let count = (ratio + 1e-6).floor() as usize;
-    let whole = (ratio - count as f64).abs() < 1e-6;
-    (0..=count).map(|k| if whole && k == count { to } else { from + (to - from).signum() * step * k as f64 }).collect()
-}
-
-/// Follows a path `runs` times, and back each time if both directions are requested.
+/// Follows a path as often as it is traversed.
 fn traversals(
     machine: &Machine,
     along: &[f64],
     speed: f64,
-    runs: usize,
-    both_directions: bool,
-    state: impl FnMut(f64) -> Result<Vec<f64>, Fault>,
+    traversals: Traversals,
+    state: &mut dyn FnMut(f64) -> Result<Vec<f64>, Fault>,
 ) -> Result<Readings, Fault> {
     let states = along.iter().copied().map(state).collect::<Result<Vec<_>, _>>()?;
     let mut readings = Readings { positions: vec![Vec::new(); machine.axes.len()], ..Readings::default() };
     let last = along.len() - 1;
     let mut start_s = 0.0;
-    for run in 0..runs * if both_directions { 2 } else { 1 } {
-        let back = both_directions && run % 2 == 1;
+    for (run, back) in traversals.are_backward().enumerate() {
         for k in 0..along.len() {
             let here = if back { last - k } else { k };
             let origin = if back { last } else { 0 };
@@ -170,12 +156,9 @@ fn traversals(
 
 /// Positions of the axes at these angles of a test's circle; `None` for another motion.
 pub fn on_circle(machine: &Machine, test: &Test, angles: &[f64]) -> Option<Result<Vec<Vec<f64>>, Fault>> {
-    let Some(Motion::Circle { first, second, radius, centre, .. }) = &test.motion else {
-        return None;
-    };
-    let bar = bar_between_points(&test.station)?;
-    let circle = Circle::new(machine, &bar, &test.at, [*first, *second], *centre);
-    Some(circle.map(|circle| angles.iter().map(|angle| circle.state(*radius, *angle)).collect()))
+    let Moved::Circle { axes, radius, centre } = test.motion.as_ref()?.moved else { return None };
+    let circle = Circle::new(machine, &bar_between_points(&test.station)?, &test.at, axes, centre);
+    Some(circle.map(|circle| angles.iter().map(|angle| circle.state(radius, *angle)).collect()))
 }
 
 /// A circular motion of two linear axes.
@@ -225,10 +208,8 @@ impl Circle {
 
 /// The circle of a test: its two axes, their positions at the centre, and the amplitude of each, mm.
 pub fn circle_of(machine: &Machine, test: &Test) -> Option<([usize; 2], [f64; 2], [f64; 2])> {
-    let Some(Motion::Circle { first, second, radius, centre, .. }) = &test.motion else { return None };
-    let none = BallBar { workpiece_ball: [0.0; 3], spindle_ball: [0.0; 3], bar: 0.0 };
-    let bar = bar_between_points(&test.station).unwrap_or(none);
-    let circle = Circle::new(machine, &bar, &test.at, [*first, *second], *centre).ok()?;
+    let Moved::Circle { axes, radius, centre } = test.motion.as_ref()?.moved else { return None };
+    let circle = Circle::new(machine, &bar_of(&test.station), &test.at, axes, centre).ok()?;
     Some((circle.axes, circle.centre, circle.scale.map(|scale| scale * radius)))
 }
 
@@ -362,17 +343,5 @@ mod tests {
         let (way, found) = states(true);
         assert_eq!(way, [0.0, 3.0, 7.0, 10.0, 14.0]);
         assert_eq!(found, [start, vec![0.0, 0.0, 7.0], middle, vec![3.0, 4.0, 7.0], end]);
-    }
-
-    /// The last step ends exactly at the end if the path is a whole number of steps, and before it otherwise.
-    #[test]
-    fn steps_end_where_they_should() {
-        // Three times 0.1 is not 0.3, nor is 0.7 seven times 0.1.
-        assert_eq!(steps(0.0, 0.3, 0.1), [0.0, 0.1, 0.2, 0.3]);
-        assert_eq!(steps(0.7, 0.0, 0.1).last(), Some(&0.0));
-        assert_eq!(steps(0.0, 0.7, 0.1).last(), Some(&0.7));
-        assert_eq!(steps(1.0, -1.0, 0.75), [1.0, 0.25, -0.5]);
-        assert_eq!(steps(0.0, 1.0, 2.0), [0.0]);
-        assert_eq!(steps(2.0, 2.0, 1.0), [2.0]);
     }
 }

@@ -10,7 +10,7 @@ use abbe::identify::noise::{Noise, NoiseSource};
 use abbe::identify::numerics::circle;
 use abbe::identify::problem::Problem;
 use abbe::model::instrument::Station;
-use abbe::model::session::motion::Motion;
+use abbe::model::session::motion::{Motion, Moved};
 use abbe::model::session::planned;
 use abbe::model::session::{Prior, Session};
 use nalgebra::{Point3, Rotation3, Translation3, Vector3};
@@ -46,8 +46,8 @@ const IDS: [&str; 8] = ["EY0A", "EZ0A", "EB0A", "EC0A", "EX0C", "EY0C", "EA0C", 
 fn plan(chapter: &str) -> Session {
     let mut session = files::session(&ready(&format!("hermle-c600u/{chapter}.toml")), &ReadOptions::default()).unwrap();
     for test in &mut session.tests {
-        if let Some(Motion::Sweep { step, .. }) = &mut test.motion {
-            *step *= 4.0;
+        if let Some(Motion { moved: Moved::Axis(_), course }) = &mut test.motion {
+            course.step *= 4.0;
         }
     }
     session.resolution_mm = None;
@@ -256,8 +256,8 @@ fn the_distortion_by_eccentricity_is_below_a_fifth_of_a_micrometre_up_to_141_mic
 fn uncertainties_of_the_cone_cover_noise_and_set_ups() {
     let mut plan = plan("chapter5");
     for test in &mut plan.tests {
-        if let Some(Motion::Sweep { step, .. }) = &mut test.motion {
-            *step *= 3.0;
+        if let Some(Motion { moved: Moved::Axis(_), course }) = &mut test.motion {
+            course.step *= 3.0;
         }
         for prior in &mut test.priors {
             *prior = Prior::Known;

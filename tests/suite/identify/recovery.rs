@@ -6,7 +6,7 @@ use abbe::identify::fit::{Fit, prepare};
 use abbe::identify::problem::Problem;
 use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulation, simulate};
-use abbe::model::session::motion::Motion;
+use abbe::model::session::motion::{Motion, Moved};
 use abbe::model::session::{Prior, Session};
 use rayon::prelude::*;
 
@@ -75,8 +75,8 @@ fn pulls_have_mean_0_and_standard_deviation_1_over_200_draws() {
     const DRAWS: u64 = 200;
     let mut plan = plan("chapter5");
     for test in &mut plan.tests {
-        if let Some(Motion::Sweep { step, .. }) = &mut test.motion {
-            *step *= 6.0;
+        if let Some(Motion { moved: Moved::Axis(_), course }) = &mut test.motion {
+            course.step *= 6.0;
         }
     }
     let draws: Vec<Vec<f64>> = (0..DRAWS)

@@ -14,6 +14,7 @@ use abbe::model::instrument::Station;
 use abbe::model::instrument::probe::Probe;
 use abbe::model::sensitivity::{SlotValues, TestModel};
 use abbe::model::session::Session;
+use abbe::model::session::motion::Traversals;
 use abbe::model::session::readings::Readings;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -422,13 +423,8 @@ fn noise_that_is_not_stated_follows_from_repeated_cycles() {
     for _ in 0..20 {
         let mut session = plan(12, 30.0);
         for test in &mut session.tests {
-            if let Some(
-                abbe::model::session::motion::Motion::Sweep { runs, .. }
-                | abbe::model::session::motion::Motion::Circle { runs, .. }
-                | abbe::model::session::motion::Motion::Follow { runs, .. },
-            ) = &mut test.motion
-            {
-                *runs = 3;
+            if let Some(motion) = &mut test.motion {
+                motion.course.traversals = Traversals::new(3, motion.course.traversals.both_directions());
             }
         }
         session.noise_mm = None;

@@ -10,9 +10,9 @@ impl Path {
     /// Duration of all traversals with pauses of `dwell_s` between them, min.
     pub fn minutes(&self, machine: &Machine, dwell_s: f64) -> f64 {
         let once: f64 = self.legs.iter().map(|leg| leg.minutes(machine)).sum();
-        let traversals = self.runs * if self.both_directions { 2 } else { 1 };
+        let traversals = self.traversals.are_backward().len();
         // In one direction alone the axes go back between two runs.
-        let ways = if self.both_directions { traversals } else { 2 * traversals - 1 };
+        let ways = if self.traversals.both_directions() { traversals } else { 2 * traversals - 1 };
         let rests_s = self.rest_s.unwrap_or(0.0) * (self.targets() * traversals) as f64;
         once * ways as f64 + dwell_s / 60.0 * (traversals - 1) as f64 + rests_s / 60.0
     }
@@ -44,6 +44,8 @@ impl Leg {
 
 #[cfg(test)]
 mod tests {
+    use abbe_model::session::motion::Traversals;
+
     use super::*;
 
     /// One way through a leg of each kind. The machine has the axes X, Y and C in this order.
@@ -62,8 +64,7 @@ mod tests {
         let path = Path {
             legs: vec![leg],
             overshoots: Vec::new(),
-            runs: 1,
-            both_directions: false,
+            traversals: Traversals::new(1, false),
             rest_s: None,
             feed: (0.0, ""),
             remarks: Vec::new(),

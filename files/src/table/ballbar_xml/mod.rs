@@ -14,7 +14,7 @@ use std::path::Path;
 
 use abbe_model::diagnostic::{Diagnostic, Location};
 use abbe_model::instrument::column::Quantity;
-use abbe_model::session::motion::Motion;
+use abbe_model::session::motion::{Course, Motion, Moved};
 use abbe_model::session::readings::{Origin, Readings};
 use abbe_model::session::trajectory;
 use contents::READINGS;
@@ -53,12 +53,12 @@ fn read(file: &Path, request: &Request<'_>) -> Result<WholeReadings, Diagnostic>
         let help = "only ball-bar files with runs of READINGS are read; export the readings as CSV and map its columns";
         return Err(fault(0, "it has no element READINGS".into(), help.into()));
     }
-    let Some(Motion::Circle { first, second, from, to, .. }) = &test.motion else {
+    let Some(Motion { moved: Moved::Circle { axes, .. }, course: Course { from, to, .. } }) = &test.motion else {
         let help = "state the circle: `path = { kind = \"circle\", plane = \"XY\", radius_mm = …, from_deg = …, to_deg = …, step_deg = 1 }`; \
                     readings are evenly distributed from one end to the other";
         return Err(fault(0, "READINGS have no angles, and the test has no `path`".into(), help.into()));
     };
-    let plane = [*first, *second].map(|axis| request.machine.axes[axis].name.clone()).concat();
+    let plane = axes.map(|axis| request.machine.axes[axis].name.clone()).concat();
     if let Some((stated, line)) = &contents.plane {
         let letters = |text: &str| {
             let mut letters: Vec<char> = text.to_uppercase().chars().collect();
