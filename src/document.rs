@@ -123,7 +123,7 @@ impl<'r> StatedHistory<'r> {
 
 /// The document of a command: what it was, and its result.
 #[derive(Serialize, JsonSchema)]
-pub struct Document<'r, T> {
+pub struct Document<T> {
     /// Version of this schema.
     #[schemars(extend("const" = SCHEMA_VERSION))]
     schema_version: u32,
@@ -144,13 +144,21 @@ pub struct Document<'r, T> {
     options: Map<String, Value>,
     /// The result.
     #[serde(flatten)]
-    result: &'r T,
+    result: T,
 }
 
-impl<'r, T: Serialize> Document<'r, T> {
-    /// The document of a call with its result.
-    pub fn new(call: Call, origin: Origin, seed: Option<u64>, result: &'r T) -> Self {
-        Document {
+impl Document<Value> {
+    /// The document of a call with its result, as text.
+    ///
+    /// # Errors
+    /// If the result is no JSON, in words.
+    pub fn text(
+        call: Call,
+        origin: Origin,
+        seed: Option<u64>,
+        result: serde_json::Result<Value>,
+    ) -> Result<String, String> {
+        let document = |result| Document {
             schema_version: SCHEMA_VERSION,
             tool_version: env!("CARGO_PKG_VERSION").to_string(),
             command: call.command,
@@ -159,32 +167,21 @@ impl<'r, T: Serialize> Document<'r, T> {
             seed,
             options: call.options,
             result,
-        }
-    }
-
-    /// The document as text.
-    ///
-    /// # Errors
-    /// If the result is no JSON, in words.
-    pub fn text(&self) -> Result<String, String> {
-        let text = serde_json::to_string_pretty(self).and_then(in_reading_units);
+        };
+        let text = result.and_then(|result| serde_json::to_string_pretty(&document(result)));
         text.map(|text| text + "\n").map_err(|error| format!("the result cannot be written as JSON: {error}"))
     }
 }
 
-/// Figures of readings end in the unit of the readings: where a result states `reading_unit`, its keys and those within
-/// it that end in `_um` and are of readings end in that unit instead.
+/// A result as JSON. Figures of readings end in the unit of the readings: where a result states `reading_unit`, its keys and
+/// those within it that end in `_um` and are of readings end in that unit instead.
 ///
 /// # Errors
-/// If the text is no JSON.
-pub fn in_reading_units(text: String) -> serde_json::Result<String> {
-    // The key stands nowhere else, and most results have none.
-    if !text.contains("\"reading_unit\":") {
-        return Ok(text);
-    }
-    let mut value: Value = serde_json::from_str(&text)?;
+/// If it is no JSON.
+pub fn json(result: &impl Serialize) -> serde_json::Result<Value> {
+    let mut value = serde_json::to_value(result)?;
     rename(&mut value, None);
-    serde_json::to_string_pretty(&value)
+    Ok(value)
 }
 
 /// Whether a key is a figure of readings in µm: noise, residuals, held-out errors, what an effect gains.

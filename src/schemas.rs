@@ -1,4 +1,4 @@
-//! What the files hold, as JSON Schema: one line of a registry for each.
+//! What the files hold, as JSON Schema: one line of a registry for each, and that of each analysis.
 
 use abbe_apply::correction::stream;
 use abbe_apply::geometric::Comparison as GeometricComparison;
@@ -16,10 +16,9 @@ use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde_json::{Value, json};
 
+use crate::analysis::{ANALYSES, Line};
 use crate::certificate::Certificate;
-use crate::document::{
-    Document, StatedComparison, StatedFit, StatedHistory, StatedPlan, StatedTrace, StatedValidation,
-};
+use crate::document::{Document, StatedHistory};
 use crate::exports::ExportResult;
 use crate::fleet::record::Record;
 use crate::fleet::run::RunResult;
@@ -30,46 +29,50 @@ pub struct FileSchema {
     /// The word by which its schema is requested.
     pub word: &'static str,
     /// What the file is.
-    pub about: &'static str,
+    pub about: String,
     /// Its schema.
     pub schema: fn() -> Value,
 }
 
-const fn file(word: &'static str, about: &'static str, schema: fn() -> Value) -> FileSchema {
-    FileSchema { word, about, schema }
+/// The files.
+pub fn schemas() -> Vec<FileSchema> {
+    let file = |&(word, about, schema): &Named| FileSchema { word, about: about.to_string(), schema };
+    let document = |line: &Line| FileSchema {
+        word: line.name,
+        about: format!("`abbe {} --json`", line.name),
+        schema: line.schema,
+    };
+    FILES.iter().map(file).chain(ANALYSES.iter().map(document)).collect()
 }
 
-/// The files.
-pub const SCHEMAS: &[FileSchema] = &[
-    file("session", "session.toml", schema::session),
-    file("machine", "machine.toml", schema::machine),
-    file("fit", "`abbe fit --json`", of::<StatedFit>),
-    file("repeat", "`abbe compare --repeated --json`", of::<Repeated>),
-    file("geometric", "`abbe fit --method circle|cone|two-plane --json`", of::<GeometricComparison>),
-    file("self-calibration", "`abbe fit --method self-calibration --json`", of::<SelfCalibration>),
-    file("trace", "`abbe trace --json`", of::<StatedTrace>),
-    file("validate", "`abbe validate --json`", of::<StatedValidation>),
-    file("model", "`abbe fit|trace --save`", plain::<model_file::document::Document>),
-    file("plan", "`abbe plan --json`", of::<StatedPlan>),
-    file("next-test", "`abbe plan --improve|--separate|--range --json`", of::<NextTest>),
-    file("global", "`abbe plan --global --json`", of::<GlobalAnalysis>),
-    file("poses", "`abbe poses --json`", of::<PoseSelection>),
-    file("patterns", "`abbe plan --patterns --json`", of::<Patterns>),
-    file("simulate", "`abbe simulate --json`", of::<SimulationResult>),
-    file("map", "`abbe volumetric --map --json`", of::<Summary>),
-    file("compare", "`abbe compare --json`", of::<StatedComparison>),
-    file("import", "`abbe import --json`", of::<ImportResult>),
-    file("export", "`abbe export --json`", of::<ExportResult>),
-    file("compensate", "`abbe compensate --json`", of::<stream::Summary>),
-    file("run", "`abbe fleet run --json`", of::<RunResult>),
-    file("history", "`abbe fleet history --json`", of::<StatedHistory>),
-    file("functions", "The error functions of `abbe volumetric --functions`, as JSON", || {
+/// A word, what the file is, and its schema.
+type Named = (&'static str, &'static str, fn() -> Value);
+
+const FILES: &[Named] = &[
+    ("session", "session.toml", schema::session),
+    ("machine", "machine.toml", schema::machine),
+    ("repeat", "`abbe compare --repeated --json`", of::<Repeated>),
+    ("geometric", "`abbe fit --method circle|cone|two-plane --json`", of::<GeometricComparison>),
+    ("self-calibration", "`abbe fit --method self-calibration --json`", of::<SelfCalibration>),
+    ("model", "`abbe fit|trace --save`", plain::<model_file::document::Document>),
+    ("next-test", "`abbe plan --improve|--separate|--range --json`", of::<NextTest>),
+    ("global", "`abbe plan --global --json`", of::<GlobalAnalysis>),
+    ("poses", "`abbe poses --json`", of::<PoseSelection>),
+    ("patterns", "`abbe plan --patterns --json`", of::<Patterns>),
+    ("simulate", "`abbe simulate --json`", of::<SimulationResult>),
+    ("map", "`abbe volumetric --map --json`", of::<Summary>),
+    ("import", "`abbe import --json`", of::<ImportResult>),
+    ("export", "`abbe export --json`", of::<ExportResult>),
+    ("compensate", "`abbe compensate --json`", of::<stream::Summary>),
+    ("run", "`abbe fleet run --json`", of::<RunResult>),
+    ("history", "`abbe fleet history --json`", of::<StatedHistory>),
+    ("functions", "The error functions of `abbe volumetric --functions`, as JSON", || {
         schema::of::<error_functions::File>("Abbe file of error functions")
     }),
-    file("certificate", "`certificate.toml` of `abbe fit --dcc`, as JSON", || {
+    ("certificate", "`certificate.toml` of `abbe fit --dcc`, as JSON", || {
         schema::of::<Certificate>("Abbe file of a certificate")
     }),
-    file("record", "The result of a session in the folder of `abbe fleet run`", plain::<Record>),
+    ("record", "The result of a session in the folder of `abbe fleet run`", plain::<Record>),
 ];
 
 /// The schema of a file that has no head of a command.
@@ -86,8 +89,8 @@ fn open<T: JsonSchema>() -> Value {
 }
 
 /// The schema of a command's document.
-fn of<T: JsonSchema + 'static>() -> Value {
-    let (mut schema, result) = (open::<Document<'static, T>>(), open::<T>());
+pub fn of<T: JsonSchema + 'static>() -> Value {
+    let (mut schema, result) = (open::<Document<T>>(), open::<T>());
     for key in ["title", "description"] {
         schema[key] = result[key].clone();
     }

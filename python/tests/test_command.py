@@ -2,6 +2,7 @@
 
 import csv
 import io
+import pickle
 import re
 import subprocess
 
@@ -153,3 +154,11 @@ def test_messages_are_those_of_the_command(command, tmp_path):
     assert error.file == str(file)
     line = file.read_text().splitlines()[error.line - 1]
     assert line.startswith("bar_mm = -3") and line[error.column - 1 :] == "-3"
+
+
+def test_an_analysis_by_its_name(chapter5):
+    found = abbe.analyse("plan", chapter5, no_effects=True)
+    assert found.to_dict() == chapter5.plan(effects=False).to_dict()
+    assert pickle.loads(pickle.dumps(found)) == found
+    with pytest.raises(abbe.SessionError, match="an option of `plan` cannot be used"):
+        abbe.analyse("plan", chapter5, effects=False)

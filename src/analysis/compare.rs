@@ -5,13 +5,13 @@ use abbe_apply::compare::workspace::PLACES;
 use abbe_apply::compare::{CompareOptions, Input, SIGNIFICANCE, compare_inputs};
 use abbe_model::Diagnostic;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::{Analysis, Found, Given, Listener, unusable};
-use crate::document::{Call, Document, Origin, Stated, StatedComparison};
+use crate::document::{Stated, StatedComparison, json};
 use crate::report;
 use crate::report::block::Report;
 use crate::report::commands::Commands;
-use crate::report::table::Table;
 
 /// The options of a comparison.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -56,6 +56,7 @@ pub struct Compared {
 impl Analysis for Compared {
     const NAME: &'static str = "compare";
     type Options = ComparisonOptions;
+    type Result = StatedComparison<'static>;
 
     fn run(given: &[Given<'_>], options: &ComparisonOptions, seed: u64, _: Listener<'_>) -> Result<Self, Diagnostic> {
         if given.len() < 2 || given.len() != options.names.len() {
@@ -77,22 +78,14 @@ impl Compared {
     fn stated(&self) -> StatedComparison<'_> {
         Stated { statements: self.comparison.statements(), result: &self.comparison }
     }
-
-    fn shown(&self, commands: &Commands) -> Report {
-        report::compare::report(&self.machine, &self.stated(), self.with_workspace, commands)
-    }
 }
 
 impl Found for Compared {
-    fn document(&self, call: Call, origin: Origin, seed: Option<u64>) -> Result<String, String> {
-        Document::new(call, origin, seed, &self.stated()).text()
+    fn result(&self) -> serde_json::Result<Value> {
+        json(&self.stated())
     }
 
     fn report(&self, commands: &Commands, _: bool) -> Result<Report, Diagnostic> {
-        Ok(self.shown(commands))
-    }
-
-    fn tables(&self) -> Vec<Table> {
-        self.shown(&Commands::default()).tables().cloned().collect()
+        Ok(report::compare::report(&self.machine, &self.stated(), self.with_workspace, commands))
     }
 }

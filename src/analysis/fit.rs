@@ -8,9 +8,10 @@ use abbe_model::Diagnostic;
 use abbe_plan::attainable;
 use abbe_trace::SessionFit;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::{Analysis, Found, Given, Listener, session_of};
-use crate::document::{Call, Document, Origin, Stated, StatedFit};
+use crate::document::{Stated, StatedFit, json};
 use crate::report;
 use crate::report::block::Report;
 use crate::report::commands::Commands;
@@ -28,14 +29,16 @@ pub struct FitOptions {
     /// Example: --assume EZC~C:h2
     #[cfg_attr(feature = "command", arg(long, value_name = "EFFECT", allow_hyphen_values = true))]
     pub assume: Vec<String>,
-    /// Accept readings that contradict the machine, though another reading of the file explains them.
-    #[cfg_attr(feature = "command", arg(skip))]
+    /// Accept readings that contradict the machine, such as axes more than 5 % of a link beside their place. Without it they
+    /// are refused where another reading of the file explains them.
+    #[cfg_attr(feature = "command", arg(long))]
     pub allow_implausible: bool,
 }
 
 impl Analysis for SessionFit {
     const NAME: &'static str = "fit";
     type Options = FitOptions;
+    type Result = StatedFit<'static>;
 
     fn run(given: &[Given<'_>], options: &FitOptions, seed: u64, _: Listener<'_>) -> Result<Self, Diagnostic> {
         let found = SessionFit::of(&assume(session_of(given)?, &options.assume)?, seed)?;
@@ -47,8 +50,8 @@ impl Analysis for SessionFit {
 }
 
 impl Found for SessionFit {
-    fn document(&self, call: Call, origin: Origin, seed: Option<u64>) -> Result<String, String> {
-        Document::new(call, origin, seed, &stated(self)).text()
+    fn result(&self) -> serde_json::Result<Value> {
+        json(&stated(self))
     }
 
     fn report(&self, commands: &Commands, figures: bool) -> Result<Report, Diagnostic> {

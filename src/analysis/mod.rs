@@ -1,7 +1,7 @@
 //! Analyses: from options to a result, and from the result to its document, its report and its tables.
 //!
-//! The command line, Python and the page are loops over them. An analysis is one file with its options, and one line of
-//! `lines`.
+//! The command line, Python, the page and the schemas are loops over them. An analysis is one file with its options, and one
+//! line of [`ANALYSES`].
 
 mod compare;
 mod fit;
@@ -21,13 +21,14 @@ use abbe_trace::{SessionFit, TraceOutcome};
 pub use compare::{Compared, ComparisonOptions};
 pub use fit::FitOptions;
 pub use plan::{Plan, PlanningOptions, problem_of};
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 pub use trace::{Candidates, SearchOptions};
 pub use validate::{Validated, ValidationOptions};
 
-use crate::document::{Call, Origin};
+use crate::document::{Call, Document, Origin};
 use crate::report::block::Report;
 use crate::report::commands::Commands;
 use crate::report::table::Table;
@@ -49,8 +50,14 @@ pub trait Analysis: Found + Sized {
     /// The name of its command.
     const NAME: &'static str;
 
+    /// Its command, if that has no arguments beside files, options and outputs.
+    const COMMAND: Option<Command> = None;
+
     /// The options on which the result depends, by their long names on the command line.
-    type Options: Default + Serialize + DeserializeOwned;
+    type Options: Arguments;
+
+    /// The result, as the document states it.
+    type Result: JsonSchema + 'static;
 
     /// Analyses what is given. The seed is that of all random numbers.
     ///
@@ -60,13 +67,44 @@ pub trait Analysis: Found + Sized {
     -> Result<Self, Diagnostic>;
 }
 
+/// The command of an analysis.
+pub struct Command {
+    /// What it does.
+    pub about: &'static str,
+    /// Examples.
+    pub help: &'static str,
+    /// The files that it reads, in the order of their arguments.
+    pub reads: &'static [Kind],
+}
+
+/// What a file holds.
+#[derive(Clone, Copy)]
+pub enum Kind {
+    /// A session.
+    Session,
+    /// A saved model.
+    Model,
+}
+
+/// Options as JSON objects, and on the command line.
+#[cfg(feature = "command")]
+pub trait Arguments: Default + Serialize + DeserializeOwned + clap::Args {}
+#[cfg(feature = "command")]
+impl<O: Default + Serialize + DeserializeOwned + clap::Args> Arguments for O {}
+
+/// Options as JSON objects.
+#[cfg(not(feature = "command"))]
+pub trait Arguments: Default + Serialize + DeserializeOwned {}
+#[cfg(not(feature = "command"))]
+impl<O: Default + Serialize + DeserializeOwned> Arguments for O {}
+
 /// What an analysis found.
 pub trait Found: Any + Send + Sync {
-    /// The document of `--json`.
+    /// The result, as the document states it.
     ///
     /// # Errors
-    /// If the result is no JSON, in words.
-    fn document(&self, call: Call, origin: Origin, seed: Option<u64>) -> Result<String, String>;
+    /// If the result is no JSON.
+    fn result(&self) -> serde_json::Result<Value>;
 
     /// The report: the screen, and the page with its figures if they are wanted. It proposes `commands`.
     ///
@@ -75,7 +113,10 @@ pub trait Found: Any + Send + Sync {
     fn report(&self, commands: &Commands, figures: bool) -> Result<Report, Diagnostic>;
 
     /// The tables of the figures that the result is about.
-    fn tables(&self) -> Vec<Table>;
+    fn tables(&self) -> Vec<Table> {
+        let report = self.report(&Commands::default(), false);
+        report.map_or_else(|_| Vec::new(), |report| report.tables().cloned().collect())
+    }
 
     /// The fits: one before and one after, or one, or none. The last is that of the result.
     fn fits(&self) -> Vec<(&Problem, &Fit)> {
@@ -107,14 +148,38 @@ pub struct Analysed {
 }
 
 /// An analysis for a caller that chooses it by name: the options are a JSON object.
-struct Line {
-    name: &'static str,
-    run: fn(&[Given<'_>], &str, u64, Listener<'_>) -> Result<(Map<String, Value>, Box<dyn Found>), Diagnostic>,
+pub struct Line {
+    /// Its name.
+    pub name: &'static str,
+    /// Its command, if that needs no code of its own.
+    pub command: Option<Command>,
+    /// The schema of its document.
+    #[cfg(feature = "fleet")]
+    pub schema: fn() -> Value,
+    /// Adds its options to those of a command.
+    #[cfg(feature = "command")]
+    pub arguments: fn(clap::Command) -> clap::Command,
+    /// The options on a command line, as a JSON object.
+    #[cfg(feature = "command")]
+    pub options: fn(&clap::ArgMatches) -> Result<String, Diagnostic>,
+    /// Runs it: the options that differ from those of a call that states none, and what it found.
+    pub run: fn(&[Given<'_>], &str, u64, Listener<'_>) -> Result<(Map<String, Value>, Box<dyn Found>), Diagnostic>,
 }
 
-fn line<A: Analysis>() -> Line {
+const fn line<A: Analysis>() -> Line {
     Line {
         name: A::NAME,
+        command: A::COMMAND,
+        #[cfg(feature = "fleet")]
+        schema: crate::schemas::of::<A::Result>,
+        #[cfg(feature = "command")]
+        arguments: <A::Options as clap::Args>::augment_args,
+        #[cfg(feature = "command")]
+        options: |matches| {
+            let options = <A::Options as clap::FromArgMatches>::from_arg_matches(matches);
+            let options = options.map_err(|cause| Diagnostic::other(cause.to_string()))?;
+            serde_json::to_string(&options).map_err(|cause| Diagnostic::other(cause.to_string()))
+        },
         run: |given, options, seed, listener| {
             let unusable =
                 |cause: serde_json::Error| unusable(format!("an option of `{}` cannot be used: {cause}", A::NAME), "");
@@ -126,9 +191,8 @@ fn line<A: Analysis>() -> Line {
 }
 
 /// The analyses.
-fn lines() -> [Line; 5] {
-    [line::<SessionFit>(), line::<TraceOutcome>(), line::<Plan>(), line::<Validated>(), line::<Compared>()]
-}
+pub static ANALYSES: [Line; 5] =
+    [line::<SessionFit>(), line::<TraceOutcome>(), line::<Plan>(), line::<Validated>(), line::<Compared>()];
 
 /// The options that differ from those of a call that states none.
 ///
@@ -152,7 +216,7 @@ pub fn run(
     seed: u64,
     listener: Listener<'_>,
 ) -> Result<Analysed, Diagnostic> {
-    let line = lines().into_iter().find(|line| line.name == name);
+    let line = ANALYSES.iter().find(|line| line.name == name);
     let line = line.ok_or_else(|| Diagnostic::other(format!("there is no analysis `{name}`")))?;
     let (options, found) = (line.run)(given, options, seed, listener)?;
     Ok(Analysed { call: Call { command: name.to_string(), options }, seed, found })
@@ -177,7 +241,7 @@ impl Analysed {
     /// # Errors
     /// If the result is no JSON, in words.
     pub fn document(&self, origin: Origin) -> Result<String, String> {
-        self.found.document(self.call.clone(), origin, Some(self.seed))
+        Document::text(self.call.clone(), origin, Some(self.seed), self.found.result())
     }
 
     /// The model of `--save`.

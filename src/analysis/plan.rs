@@ -8,9 +8,10 @@ use abbe_model::unit::InternalUnit;
 use abbe_plan::results::PlanAnalysis;
 use abbe_plan::{PlanOptions, analyse, collision, prepared, states};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::{Analysis, Found, Given, Listener, session_of, unusable};
-use crate::document::{Call, Document, Origin, Stated, StatedPlan};
+use crate::document::{Stated, StatedPlan, json};
 use crate::report::block::Report;
 use crate::report::commands::Commands;
 use crate::report::plan as present;
@@ -18,17 +19,27 @@ use crate::report::table::Table;
 
 /// The options of the analysis of a plan.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "command", derive(clap::Args))]
 #[serde(default, deny_unknown_fields)]
 pub struct PlanningOptions {
     /// Standard deviation of a reading, µm, instead of the session's.
+    ///
+    /// Example: --noise-um 0.5
+    #[cfg_attr(feature = "command", arg(long, value_name = "UM", allow_negative_numbers = true))]
     pub noise_um: Option<f64>,
-    /// Use the planned movements even if there are readings.
+    /// Use the planned movements even if there are data.
+    #[cfg_attr(feature = "command", arg(long))]
     pub planned: bool,
     /// Do not screen undeclared effects.
+    #[cfg_attr(feature = "command", arg(long))]
     pub no_effects: bool,
-    /// Standard uncertainty of every set-up length with a Gaussian prior, µm, instead of the session's.
+    /// Standard uncertainty of every set-up length with a prior, instead of the session's.
+    ///
+    /// Example: --setup-um 1
+    #[cfg_attr(feature = "command", arg(long, value_name = "UM", allow_negative_numbers = true))]
     pub setup_um: Option<f64>,
-    /// One mounted spindle ball serves all tests.
+    /// Use one mounted spindle ball for all tests.
+    #[cfg_attr(feature = "command", arg(long))]
     pub one_spindle_ball: bool,
 }
 
@@ -111,6 +122,7 @@ impl Plan {
 impl Analysis for Plan {
     const NAME: &'static str = "plan";
     type Options = PlanningOptions;
+    type Result = StatedPlan<'static>;
 
     fn run(given: &[Given<'_>], options: &PlanningOptions, _: u64, _: Listener<'_>) -> Result<Self, Diagnostic> {
         let mut session = session_of(given)?.clone();
@@ -137,8 +149,8 @@ impl Analysis for Plan {
 }
 
 impl Found for Plan {
-    fn document(&self, call: Call, origin: Origin, seed: Option<u64>) -> Result<String, String> {
-        Document::new(call, origin, seed, &self.stated()).text()
+    fn result(&self) -> serde_json::Result<Value> {
+        json(&self.stated())
     }
 
     fn report(&self, commands: &Commands, figures: bool) -> Result<Report, Diagnostic> {

@@ -13,10 +13,11 @@ use abbe_plan::separating_tests::separate_aliases;
 use abbe_plan::test_variations::TestVariations;
 use abbe_trace::{Progress, TraceOptions, TraceOutcome, trace};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::fit::estimates;
 use super::{Analysis, Found, Given, Listener, session_of, unusable};
-use crate::document::{Call, Document, Origin, Stated, StatedTrace};
+use crate::document::{Stated, StatedTrace, json};
 use crate::report;
 use crate::report::block::Report;
 use crate::report::commands::Commands;
@@ -59,8 +60,9 @@ pub struct SearchOptions {
     /// Example: --assume EAC~C:h1
     #[cfg_attr(feature = "command", arg(long, value_name = "EFFECT", allow_hyphen_values = true))]
     pub assume: Vec<String>,
-    /// Accept readings that contradict the machine, though another reading of the file explains them.
-    #[cfg_attr(feature = "command", arg(skip))]
+    /// Accept readings that contradict the machine, such as axes more than 5 % of a link beside their place. Without it they
+    /// are refused where another reading of the file explains them.
+    #[cfg_attr(feature = "command", arg(long))]
     pub allow_implausible: bool,
     /// Seconds after which the search ends with the effects found so far. A time beyond what a clock can hold is no limit.
     #[cfg_attr(feature = "command", arg(skip))]
@@ -97,6 +99,7 @@ impl SearchOptions {
 impl Analysis for TraceOutcome {
     const NAME: &'static str = "trace";
     type Options = SearchOptions;
+    type Result = StatedTrace<'static>;
 
     fn run(
         given: &[Given<'_>],
@@ -138,8 +141,8 @@ impl Analysis for TraceOutcome {
 }
 
 impl Found for TraceOutcome {
-    fn document(&self, call: Call, origin: Origin, seed: Option<u64>) -> Result<String, String> {
-        Document::new(call, origin, seed, &stated(self)).text()
+    fn result(&self) -> serde_json::Result<Value> {
+        json(&stated(self))
     }
 
     fn report(&self, commands: &Commands, figures: bool) -> Result<Report, Diagnostic> {

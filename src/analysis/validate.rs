@@ -5,9 +5,10 @@ use abbe_model::Diagnostic;
 use abbe_model::component::ErrorName;
 use abbe_trace::validate::{Validation, validate_anew};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
-use super::{Analysis, Found, Given, Listener, unusable};
-use crate::document::{Call, Document, Origin, Stated, StatedValidation};
+use super::{Analysis, Command, Found, Given, Kind, Listener, unusable};
+use crate::document::{Stated, StatedValidation, json};
 use crate::report::block::Report;
 use crate::report::commands::Commands;
 use crate::report::table::Table;
@@ -43,7 +44,13 @@ pub struct Validated {
 
 impl Analysis for Validated {
     const NAME: &'static str = "validate";
+    const COMMAND: Option<Command> = Some(Command {
+        about: "Test a saved model on readings that it never saw.",
+        help: include_str!("../cli/help/validate.txt"),
+        reads: &[Kind::Model, Kind::Session],
+    });
     type Options = ValidationOptions;
+    type Result = StatedValidation<'static>;
 
     fn run(given: &[Given<'_>], options: &ValidationOptions, _: u64, _: Listener<'_>) -> Result<Self, Diagnostic> {
         let [Given::Model(model), Given::Session(session)] = given else {
@@ -64,8 +71,8 @@ impl Validated {
 }
 
 impl Found for Validated {
-    fn document(&self, call: Call, origin: Origin, seed: Option<u64>) -> Result<String, String> {
-        Document::new(call, origin, seed, &self.stated()).text()
+    fn result(&self) -> serde_json::Result<Value> {
+        json(&self.stated())
     }
 
     fn report(&self, commands: &Commands, _: bool) -> Result<Report, Diagnostic> {

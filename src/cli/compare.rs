@@ -3,17 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use abbe::analysis::{Analysis, Compared, ComparisonOptions, Given};
-use abbe::files::stamp::FileStamp;
-use abbe::files::{self, ReadOptions, SourceMap};
-use abbe::identify::model_file::{self, IdentifiedModel};
 use abbe::model::Diagnostic;
-use abbe::model::session::Session;
 use clap::Args;
 
+use super::analysis::File;
 use super::failure::command_line;
-use super::output::Outputs;
 use super::results::Read;
-use super::{CommonArguments, DataArguments, Global, PlausibilityArguments, repeated};
+use super::{CommonArguments, DataArguments, Global, repeated};
 
 /// Examples of `abbe compare`.
 pub const HELP: &str = include_str!("help/compare.txt");
@@ -30,8 +26,10 @@ pub struct CompareArguments {
     /// (Type A) beside that of each fit (Type B).
     #[arg(long, conflicts_with_all = ["shared", "significance", "places"])]
     repeated: bool,
-    #[command(flatten)]
-    plausibility: PlausibilityArguments,
+    /// Accept readings that contradict the machine, such as axes more than 5 % of a link beside their place. Without it they
+    /// are refused where another reading of the file explains them.
+    #[arg(long)]
+    allow_implausible: bool,
     #[command(flatten)]
     options: ComparisonOptions,
     #[command(flatten)]
@@ -52,52 +50,20 @@ pub fn run(arguments: &CompareArguments, _: Global) -> Result<(), Diagnostic> {
     if arguments.inputs.len() < 2 {
         return Err(command_line("at least two sessions or models are expected; name another"));
     }
-    if arguments.plausibility.allow_implausible && !arguments.repeated {
+    if arguments.allow_implausible && !arguments.repeated {
         let message = "`--allow-implausible` belongs to `--repeated`; state both or none";
         return Err(command_line(message));
     }
     if arguments.repeated {
-        return repeated::run(&arguments.inputs, &arguments.data, arguments.plausibility, common, &outputs);
+        return repeated::run(&arguments.inputs, &arguments.data, arguments.allow_implausible, common, &outputs);
     }
     let reading = arguments.data.options();
     let inputs: Vec<File> =
-        arguments.inputs.iter().map(|file| read(file, &reading, &outputs)).collect::<Result<_, _>>()?;
+        arguments.inputs.iter().map(|file| File::read(file, None, &reading, &outputs)).collect::<Result<_, _>>()?;
     let names = arguments.inputs.iter().map(|file| file.display().to_string()).collect();
     let options = ComparisonOptions { names, ..arguments.options.clone() };
     let given: Vec<Given<'_>> = inputs.iter().map(File::given).collect();
     let found = Compared::run(&given, &options, common.seed, &|_| true)?;
-    let mut from = Read { seed: Some(common.seed), ..Read::default() };
-    for input in &inputs {
-        match input {
-            File::Session(read) => from.sessions.push((&read.0, &read.1)),
-            File::Model(_, stamp) => from.files.extend(stamp),
-        }
-    }
-    common.output.put_found(&outputs, &found, &arguments.data.commands(Path::new("")), &from)
-}
-
-/// An input with what it was read from.
-enum File {
-    Session(Box<(Session, SourceMap)>),
-    Model(Box<IdentifiedModel>, Option<FileStamp>),
-}
-
-impl File {
-    fn given(&self) -> Given<'_> {
-        match self {
-            File::Session(read) => Given::Session(&read.0),
-            File::Model(model, _) => Given::Model(model),
-        }
-    }
-}
-
-fn read(file: &Path, options: &ReadOptions, outputs: &Outputs) -> Result<File, Diagnostic> {
-    let source = files::text(file, "the session or model")?;
-    if model_file::is_model(&source.text) {
-        outputs.refuse_overwrite([file])?;
-        return Ok(File::Model(Box::new(model_file::of_source(&source)?), source.stamp));
-    }
-    let (session, sources) = files::session_of(&source, options)?;
-    outputs.refuse_overwrite_of_sources(&sources)?;
-    Ok(File::Session(Box::new((session, sources))))
+    let commands = arguments.data.commands(Path::new(""));
+    common.output.put_found(&outputs, &found, &commands, &Read::inputs(&inputs, common.seed))
 }

@@ -1,9 +1,9 @@
 //! `abbe completions`: what a shell completes.
 
 use abbe::model::Diagnostic;
-use clap::{Args, CommandFactory};
+use clap::Args;
 
-use super::{Arguments, Global, output};
+use super::{Global, output, parser};
 
 /// An example of `abbe completions`.
 pub const HELP: &str = "Example:
@@ -22,7 +22,7 @@ pub struct CompletionArguments {
 /// Runs `abbe completions`.
 pub fn run(arguments: &CompletionArguments, _: Global) -> Result<(), Diagnostic> {
     let mut script = Vec::new();
-    clap_complete::generate(arguments.shell, &mut Arguments::command(), "abbe", &mut script);
+    clap_complete::generate(arguments.shell, &mut parser(), "abbe", &mut script);
     output::whole(String::from_utf8_lossy(&script).trim_end());
     Ok(())
 }

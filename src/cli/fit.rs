@@ -1,7 +1,7 @@
 //! `abbe fit`: estimate errors from readings.
 
 use abbe::analysis::FitOptions;
-use abbe::identify::{fit, propagation};
+use abbe::identify::{fit, plausibility, propagation};
 use abbe::model::Diagnostic;
 use abbe::trace::SessionFit;
 use clap::Args;
@@ -23,8 +23,6 @@ pub struct FitArguments {
     session: SessionArguments,
     #[command(flatten)]
     common: CommonArguments,
-    #[command(flatten)]
-    plausibility: super::PlausibilityArguments,
     #[command(flatten)]
     save: SaveArguments,
     #[command(flatten)]
@@ -64,7 +62,7 @@ pub fn run(arguments: &FitArguments, _: Global) -> Result<(), Diagnostic> {
             ("--terms", arguments.forms.terms.is_some()),
             ("--save", save.is_some()),
             ("--dcc", dcc.is_some()),
-            ("--allow-implausible", arguments.plausibility.allow_implausible),
+            ("--allow-implausible", arguments.options.allow_implausible),
         ])?;
         return arguments.method.run(&session, &arguments.draws, (common, &outputs), &read);
     }
@@ -72,14 +70,14 @@ pub fn run(arguments: &FitArguments, _: Global) -> Result<(), Diagnostic> {
     let mut found = SessionFit::of(&session, common.seed)?;
     let SessionFit { problem, fit, result } = &mut found;
     arguments.readings.write(problem, fit)?;
-    arguments.plausibility.check(&result.plausibility)?;
+    if !arguments.options.allow_implausible {
+        plausibility::accepted(&result.plausibility)?;
+    }
     if let Some(draws) = &draws {
         propagation::add_monte_carlo(problem, fit, draws, result)?;
     }
     arguments.forms.add(problem, fit, result)?;
-    let options =
-        FitOptions { allow_implausible: arguments.plausibility.allow_implausible, ..arguments.options.clone() };
-    let commands = arguments.session.commands::<SessionFit>(common.seed, &options)?;
+    let commands = arguments.session.commands::<SessionFit>(common.seed, &arguments.options)?;
     common.output.put_found(&outputs, &found, &commands, &read)?;
     if let (Some(wanted), Some(certificate)) = (&wanted, &certificate) {
         wanted.write(certificate, &found.problem, &found.result)?;

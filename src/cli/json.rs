@@ -3,14 +3,14 @@
 use std::any::TypeId;
 
 use abbe::document::Call;
-use clap::{Arg, ArgAction, ArgMatches, CommandFactory};
+use clap::{Arg, ArgAction, ArgMatches};
 use serde_json::{Map, Value};
 
-use super::Arguments;
+use super::parser;
 
 /// The name of the command, and the options on the command line of this process.
 pub fn command_line() -> Call {
-    let mut parser = Arguments::command();
+    let mut parser = parser();
     // The command line has been parsed before.
     let Ok(mut matches) = parser.clone().try_get_matches_from(std::env::args_os()) else {
         return Call::default();
@@ -80,7 +80,7 @@ mod tests {
 
     #[test]
     fn options_have_the_types_that_the_program_reads() {
-        let parser = Arguments::command();
+        let parser = super::parser();
         let line = [
             "abbe",
             "trace",

@@ -5,6 +5,7 @@ macro_rules! say {
     ($($text:tt)*) => { $crate::cli::output::line(format_args!($($text)*)) };
 }
 
+mod analysis;
 mod certificate;
 mod compare;
 mod compensate;
@@ -40,19 +41,17 @@ mod schema;
 mod sheet;
 mod simulate;
 mod trace;
-mod validate;
 mod values;
 mod volumetric;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use abbe::analysis::{self, Analysis};
+use abbe::analysis::{Analysis, stated};
 use abbe::files::{self, ReadOptions, SourceMap};
-use abbe::identify::plausibility::{self, Plausibility};
 use abbe::model::Diagnostic;
 use abbe::model::session::Session;
-use clap::{Args, Parser, Subcommand};
+use clap::{ArgMatches, Args, FromArgMatches, Subcommand};
 use serde_json::Map;
 
 use crate::report::commands::Commands;
@@ -60,12 +59,9 @@ use failure::command_line;
 use output::Outputs;
 use results::OutputArguments;
 
-/// Geometric errors of machine tools, robots and other serial chains
-#[derive(Parser)]
-#[command(name = "abbe", version, max_term_width = 110, help_template = overview::template(), after_help = overview::EXAMPLES)]
-struct Arguments {
-    #[command(subcommand)]
-    command: Command,
+/// The options of all commands.
+#[derive(Args, Clone, Copy)]
+pub struct Global {
     /// Suppress tables and progress output; warnings and errors stay.
     #[arg(short, long, global = true)]
     quiet: bool,
@@ -74,11 +70,17 @@ struct Arguments {
     threads: Option<u32>,
 }
 
-/// The options of all commands.
-#[derive(Clone, Copy)]
-pub struct Global {
-    quiet: bool,
-    threads: Option<u32>,
+/// The parser of the command line.
+fn parser() -> clap::Command {
+    let parser = Global::augment_args(clap::Command::new("abbe"))
+        .about("Geometric errors of machine tools, robots and other serial chains")
+        .version(env!("CARGO_PKG_VERSION"))
+        .max_term_width(110)
+        .help_template(overview::template())
+        .after_help(overview::EXAMPLES)
+        .subcommand_required(true)
+        .arg_required_else_help(true);
+    analysis::added(Command::augment_subcommands(parser))
 }
 
 /// The commands: a line for each, with what it does. Its file has its arguments, its examples and what runs it.
@@ -89,9 +91,11 @@ macro_rules! commands {
             $(#[doc = $about] #[command(after_help = $module::HELP)] $name(Box<$module::$arguments>),)*
         }
 
-        /// Runs a command.
-        fn execute(command: Command, global: Global) -> Result<(), Diagnostic> {
-            match command { $(Command::$name(arguments) => $module::run(&arguments, global),)* }
+        impl Command {
+            /// Runs the command.
+            fn run(self, global: Global) -> Result<(), Diagnostic> {
+                match self { $(Command::$name(arguments) => $module::run(&arguments, global),)* }
+            }
         }
     };
 }
@@ -115,7 +119,6 @@ commands! {
     Simulate: simulate::SimulateArguments = "Simulate readings of planned tests with given errors.";
     Poses: poses::PoseArguments = "Choose the poses of a robot or a probe that determine its errors best.";
     Trace: trace::TraceArguments = "Find the unmodelled effect behind the residual.";
-    Validate: validate::ValidateArguments = "Test a saved model on readings that it never saw.";
 }
 
 /// Arguments of every command that reads a session.
@@ -152,22 +155,6 @@ impl DataArguments {
     }
 }
 
-/// What an identification does with estimates that mean nothing.
-#[derive(Args, Clone, Copy)]
-pub struct PlausibilityArguments {
-    /// Accept readings that contradict the machine, such as axes more than 5 % of a link beside their place. Without it they
-    /// are refused where another reading of the file explains them.
-    #[arg(long)]
-    allow_implausible: bool,
-}
-
-impl PlausibilityArguments {
-    /// Refuses estimates that mean nothing and have a cause.
-    fn check(self, found: &Plausibility) -> Result<(), Diagnostic> {
-        if self.allow_implausible { Ok(()) } else { plausibility::accepted(found) }
-    }
-}
-
 impl SessionArguments {
     /// Options of the reader.
     fn options(&self) -> ReadOptions {
@@ -190,7 +177,7 @@ impl SessionArguments {
         if seed != 1 {
             repeated.insert("seed".to_string(), seed.into());
         }
-        repeated.extend(analysis::stated(options).map_err(|cause| Diagnostic::other(cause.to_string()))?);
+        repeated.extend(stated(options).map_err(|cause| Diagnostic::other(cause.to_string()))?);
         // The next search may take its time.
         repeated.shift_remove("time_limit");
         Ok(self.data.commands(&self.session).made_by(A::NAME, &repeated))
@@ -220,8 +207,9 @@ pub struct CommonArguments {
 /// Runs the command line and returns the exit status.
 pub fn run() -> ExitCode {
     interrupt::watch();
-    let Arguments { command, quiet, threads } = match Arguments::try_parse() {
-        Ok(arguments) => arguments,
+    let parsed = parser().try_get_matches().and_then(|matches| Ok((Global::from_arg_matches(&matches)?, matches)));
+    let (global, matches) = match parsed {
+        Ok(parsed) => parsed,
         // Help and version, to standard output.
         Err(shown) if !shown.use_stderr() => {
             output::help(&shown);
@@ -232,7 +220,7 @@ pub fn run() -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    match with_threads(threads).and_then(|()| execute(command, Global { quiet, threads })) {
+    match with_threads(global.threads).and_then(|()| execute(&matches, global)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(_) if interrupt::is_ended() => ExitCode::from(interrupt::status()),
         Err(failure) => {
@@ -249,11 +237,21 @@ fn with_threads(threads: Option<u32>) -> Result<(), Diagnostic> {
     pool.map_err(|cause| Diagnostic::other(format!("{threads} threads cannot be started: {cause}; state fewer")))
 }
 
+/// Runs what a command line states.
+fn execute(matches: &ArgMatches, global: Global) -> Result<(), Diagnostic> {
+    if let Some((name, own)) = matches.subcommand()
+        && let Some((line, command)) = analysis::commands().find(|(line, _)| line.name == name)
+    {
+        return analysis::run(line, command, own);
+    }
+    Command::from_arg_matches(matches).map_err(|wrong| command_line(wrong.to_string()))?.run(global)
+}
+
 /// Runs another command line as a part of a command.
 fn again(arguments: &[&str], quiet: bool) -> Result<(), Diagnostic> {
     let words = std::iter::once("abbe").chain(arguments.iter().copied());
-    let parsed = Arguments::try_parse_from(words).map_err(|wrong| command_line(wrong.to_string()))?;
-    execute(parsed.command, Global { quiet, threads: parsed.threads })
+    let matches = parser().try_get_matches_from(words).map_err(|wrong| command_line(wrong.to_string()))?;
+    execute(&matches, Global { quiet, threads: None })
 }
 
 /// Reads the session, with its sources. No output may replace one of its files.

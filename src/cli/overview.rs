@@ -2,7 +2,7 @@
 
 use clap::Subcommand;
 
-use super::Command;
+use super::{Command, analysis};
 
 /// Examples of `abbe`.
 pub const EXAMPLES: &str = "Example, from a template to a found effect (`abbe COMMAND --help` has more):
@@ -16,24 +16,33 @@ pub const EXAMPLES: &str = "Example, from a template to a found effect (`abbe CO
 Results go to standard output, progress and messages to standard error; FILE `-` is standard output.
 Exit status: 0 done; 1 the input cannot be used; 2 wrong command line; 130 interrupted; 143 ended.";
 
-/// The commands by task.
+/// The commands by task. An analysis that none of them names stands in [`ANALYSE`].
 const TASKS: [(&str, &[&str]); 5] = [
     ("Prepare", &["new", "import", "plan", "poses", "simulate", "sheet", "nc"]),
-    ("Analyse", &["fit", "trace", "validate", "compare"]),
+    (ANALYSE, &["fit", "trace", "validate", "compare"]),
     ("Correct", &["compensate", "volumetric", "export"]),
     ("Many machines", &["fleet"]),
     ("Write", &["equation", "paper", "schema", "completions"]),
 ];
 
+/// The task of an analysis.
+const ANALYSE: &str = "Analyse";
+
 /// The help of `abbe` with the commands by task: clap lists them in one.
 pub fn template() -> String {
-    let all = Command::augment_subcommands(clap::Command::new("abbe"));
+    let all = analysis::added(Command::augment_subcommands(clap::Command::new("abbe")));
     let line = |name: &&str| {
         let about =
             all.find_subcommand(name).and_then(clap::Command::get_about).map_or(String::new(), ToString::to_string);
         format!("  {name:<13}{about}\n")
     };
-    let tasks = TASKS.iter().map(|(task, names)| format!("{task}:\n{}\n", names.iter().map(line).collect::<String>()));
+    let others = analysis::commands().map(|(line, _)| &line.name);
+    let others = others.filter(|name| !TASKS.iter().any(|(_, names)| names.contains(name)));
+    let others: String = others.map(line).collect();
+    let tasks = TASKS.iter().map(|(task, names)| {
+        let others = if *task == ANALYSE { &others } else { "" };
+        format!("{task}:\n{}{others}\n", names.iter().map(line).collect::<String>())
+    });
     let tasks: String = tasks.collect();
     format!("{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{tasks}Options:\n{{options}}{{after-help}}\n")
 }

@@ -3,14 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use abbe::analysis::Found;
-use abbe::document::{Call, Document, Origin};
+use abbe::document::{self, Document, Origin};
 use abbe::files::SourceMap;
 use abbe::files::stamp::FileStamp;
 use abbe::model::Diagnostic;
 use abbe::model::session::Session;
 use clap::Args;
 use serde::Serialize;
+use serde_json::Value;
 
+use super::analysis::File;
 use super::failure::command_line;
 use super::folder;
 use super::json;
@@ -84,6 +86,18 @@ impl<'r> Read<'r> {
         Read { files: files.into_iter().collect(), ..Read::default() }
     }
 
+    /// Sessions and models.
+    pub fn inputs(inputs: &'r [File], seed: u64) -> Read<'r> {
+        let mut found = Read { seed: Some(seed), ..Read::default() };
+        for input in inputs {
+            match input {
+                File::Session(read) => found.sessions.push((&read.0, &read.1)),
+                File::Model(_, stamp) => found.files.extend(stamp),
+            }
+        }
+        found
+    }
+
     /// The files, for a JSON document.
     pub fn origin(&self) -> Origin {
         let mut origin = Origin::default();
@@ -133,7 +147,7 @@ impl OutputArguments {
         result: &T,
         read: &Read<'_>,
     ) -> Result<(), Diagnostic> {
-        self.write(outputs, report, read, |call, origin| Document::new(call, origin, read.seed, result).text())
+        self.write(outputs, report, read, || document::json(result))
     }
 
     /// The same of an analysis. Its report proposes `commands`.
@@ -145,7 +159,7 @@ impl OutputArguments {
         read: &Read<'_>,
     ) -> Result<(), Diagnostic> {
         let report = found.report(commands, self.report.is_some() || self.plots.is_some())?;
-        self.write(outputs, &report, read, |call, origin| found.document(call, origin, read.seed))
+        self.write(outputs, &report, read, || found.result())
     }
 
     fn write(
@@ -153,11 +167,12 @@ impl OutputArguments {
         outputs: &Outputs,
         report: &Report,
         read: &Read<'_>,
-        document: impl FnOnce(Call, Origin) -> Result<String, String>,
+        result: impl FnOnce() -> serde_json::Result<Value>,
     ) -> Result<(), Diagnostic> {
         self.show(outputs, report);
         if let Some(path) = &self.json {
-            output::write_whole(path, document(json::command_line(), read.origin())?.as_bytes())?;
+            let text = Document::text(json::command_line(), read.origin(), read.seed, result())?;
+            output::write_whole(path, text.as_bytes())?;
         }
         if let Some(path) = &self.csv {
             output::write_whole(path, &csv::report(report)?)?;

@@ -1,7 +1,7 @@
 //! `abbe schema`: what the files hold, as JSON Schema.
 
 use abbe::model::Diagnostic;
-use abbe::schemas::SCHEMAS;
+use abbe::schemas::schemas;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
@@ -16,7 +16,7 @@ Put `#:schema session.schema.json` in the first line of a session.toml, and an e
 completes keys and marks what is misspelt.";
 
 fn subjects() -> PossibleValuesParser {
-    PossibleValuesParser::new(SCHEMAS.iter().map(|file| PossibleValue::new(file.word).help(file.about)))
+    PossibleValuesParser::new(schemas().into_iter().map(|file| PossibleValue::new(file.word).help(file.about)))
 }
 
 /// `abbe schema SUBJECT`
@@ -29,7 +29,7 @@ pub struct SchemaArguments {
 
 /// Runs `abbe schema`.
 pub fn run(arguments: &SchemaArguments, _: Global) -> Result<(), Diagnostic> {
-    let file = SCHEMAS.iter().find(|file| file.word == arguments.subject);
+    let file = schemas().into_iter().find(|file| file.word == arguments.subject);
     let schema = file.map(|file| (file.schema)());
     let text = serde_json::to_string_pretty(&schema);
     output::whole(&text.map_err(|error| Diagnostic::other(format!("the schema cannot be written: {error}")))?);

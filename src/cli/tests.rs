@@ -1,9 +1,9 @@
 //! The options and commands of the command line: one meaning for each name, and examples that are accepted.
 
 use clap::error::ErrorKind;
-use clap::{Arg, Command, CommandFactory};
+use clap::{Arg, Command};
 
-use super::Arguments;
+use super::parser;
 
 /// The help texts of an option and of its command in full.
 fn help(command: &Command, option: &Arg) -> String {
@@ -32,7 +32,7 @@ fn options_with_values(command: &Command) -> Vec<(&Command, &Arg)> {
 /// An option has one meaning: the same kind of value and the same first sentence wherever it stands.
 #[test]
 fn an_option_has_one_meaning() {
-    let command = Arguments::command();
+    let command = parser();
     let mut known: std::collections::BTreeMap<&str, ([String; 2], &str)> = std::collections::BTreeMap::new();
     let mut several = Vec::new();
     for (command, option) in options(&command) {
@@ -56,7 +56,7 @@ fn an_option_has_one_meaning() {
 
 #[test]
 fn every_option_with_a_value_has_an_example() {
-    let command = Arguments::command();
+    let command = parser();
     let options = options_with_values(&command);
     assert!(options.len() > 60, "{} options", options.len());
     let without: Vec<String> = options
@@ -74,7 +74,7 @@ fn every_option_with_a_value_has_an_example() {
 fn a_name_may_begin_with_a_hyphen() {
     const NAMES: [&str; 11] =
         ["NAME", "NAMES", "TEST", "TEXT", "ID", "THING", "A,B", "EFFECT,…", "NAME=SIZE", "NAME=VALUE", "AXIS=POSITION"];
-    let command = Arguments::command();
+    let command = parser();
     let named: Vec<(&Command, &Arg)> = options_with_values(&command)
         .into_iter()
         .filter(|(_, option)| option.get_value_names().is_some_and(|names| NAMES.contains(&names[0].as_str())))
@@ -88,7 +88,7 @@ fn a_name_may_begin_with_a_hyphen() {
 /// The examples in the help of options are command lines that the parser accepts.
 #[test]
 fn examples_of_options_are_accepted() {
-    let command = Arguments::command();
+    let command = parser();
     for (command, option) in options_with_values(&command) {
         let text = option.get_long_help().map(ToString::to_string).unwrap_or_default();
         for example in text.lines().filter_map(|line| line.strip_prefix("Example: ")) {
@@ -123,7 +123,7 @@ fn examples_of_options_are_accepted() {
             let group = ["run", "history"].contains(&command.get_name()).then_some("fleet");
             let words = ["abbe"].into_iter().chain(group).chain([command.get_name()]);
             let words = words.chain(required.iter().copied()).chain(example.split(' '));
-            let parsed = Arguments::command().try_get_matches_from(words);
+            let parsed = parser().try_get_matches_from(words);
             assert!(parsed.is_ok(), "{}: {example}: {}", command.get_name(), parsed.unwrap_err());
         }
     }
@@ -171,7 +171,7 @@ fn command_lines_of_the_manual_are_accepted() {
         // In a sentence values may be placeholders, and what is required may be left out; options and commands exist.
         let inline = text.split('`').skip(1).step_by(2).filter(|piece| piece.starts_with("abbe "));
         for line in inline.filter(|piece| !piece.contains(['…', '\n', '\\']) && !piece.contains("COMMAND")) {
-            let found = words(line).map(|words| Arguments::command().try_get_matches_from(&words));
+            let found = words(line).map(|words| parser().try_get_matches_from(&words));
             if let Some(Err(found)) = found
                 && matches!(found.kind(), ErrorKind::UnknownArgument | ErrorKind::InvalidSubcommand)
             {
@@ -187,7 +187,7 @@ fn command_lines_of_the_manual_are_accepted() {
                 continue;
             };
             count += 1;
-            if let Err(found) = Arguments::command().try_get_matches_from(&words)
+            if let Err(found) = parser().try_get_matches_from(&words)
                 && found.use_stderr()
             {
                 wrong.push(format!("{}: {line}: {found}", file.display()));

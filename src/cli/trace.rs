@@ -15,7 +15,7 @@ use clock::seconds;
 
 use super::results::Read;
 use super::save::SaveArguments;
-use super::{CommonArguments, Global, PlausibilityArguments, SessionArguments, next_session, output, read_session};
+use super::{CommonArguments, Global, SessionArguments, next_session, output, read_session};
 use crate::report::readings;
 
 /// Examples of `abbe trace`.
@@ -28,8 +28,6 @@ pub struct TraceArguments {
     session: SessionArguments,
     #[command(flatten)]
     common: CommonArguments,
-    #[command(flatten)]
-    plausibility: PlausibilityArguments,
     #[command(flatten)]
     save: SaveArguments,
     #[command(flatten)]
@@ -70,11 +68,7 @@ pub fn run(arguments: &TraceArguments, _: Global) -> Result<(), Diagnostic> {
     let others = [arguments.write.as_ref(), arguments.residuals.as_ref(), arguments.save.save.as_ref()];
     let outputs = common.output.prepared(&others)?;
     let (session, sources) = read_session(&arguments.session, &outputs)?;
-    let options = SearchOptions {
-        allow_implausible: arguments.plausibility.allow_implausible,
-        time_limit: arguments.time_limit,
-        ..arguments.options.clone()
-    };
+    let options = SearchOptions { time_limit: arguments.time_limit, ..arguments.options.clone() };
     if arguments.list {
         return progress::list(&session, &options.with_seed(common.seed));
     }

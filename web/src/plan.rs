@@ -5,7 +5,7 @@ use std::cell::OnceCell;
 use abbe::analysis::problem_of;
 use abbe::codegen::print::{LATEX, Numbering, Style};
 use abbe::codegen::{Equation, Options, Order, SessionTest, Symbols, check};
-use abbe::document::{Stated, in_reading_units};
+use abbe::document::{Stated, json as document};
 use abbe::equation::EquationParameters;
 use abbe::files::template;
 use abbe::identify::problem::Problem;
@@ -166,7 +166,7 @@ impl Plan {
     pub fn analysis(&self) -> Result<String, Failed> {
         let analysis = plan::analyse(&self.read.session, &options())?;
         let stated = Stated { statements: analysis.statements(&self.problem), result: &analysis };
-        Ok(serde_json::to_string(&stated).and_then(in_reading_units).map_err(|fault| fault.to_string())?)
+        Ok(document(&stated).map_err(|fault| fault.to_string())?.to_string())
     }
 
     /// The proposal of `abbe plan --improve`, as JSON.
@@ -177,7 +177,7 @@ impl Plan {
         let goal = Goal::WorstUncertainty;
         let variations = TestVariations::default();
         let found = improve(&self.problem, &variations, &ImproveOptions { goal, tests: 1, by_minute: false })?;
-        Ok(serde_json::to_string(&found).and_then(in_reading_units).map_err(|fault| fault.to_string())?)
+        Ok(document(&found).map_err(|fault| fault.to_string())?.to_string())
     }
 
     /// The equation of the readings of a test to first order, in LaTeX.

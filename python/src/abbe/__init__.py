@@ -5,6 +5,7 @@ A session is a machine, its tests and their readings:
 - :class:`Machine`: a kinematic chain; :class:`Session`: tests and readings, from files or from arrays;
 - :class:`Fit`, :class:`Trace`, :class:`Plan`: results of a session; :class:`Model`: an identified machine, with
   :class:`Validation` and :class:`Compensated`; :class:`Equation`: a closed form; :func:`compare`: differences;
+- :func:`analyse`: any analysis by the name of its command;
 - :func:`import_readings`: foreign files of readings as a session;
 - :class:`Table`, :class:`Figure`: what results show;
 - :class:`Error` and its subclasses.
@@ -14,6 +15,7 @@ the command ``abbe``: ``to_dict()`` returns its JSON.
 """
 
 from ._abbe import __version__, set_threads, threads
+from ._analyse import Analysis, analyse
 from ._compare import Comparison, compare
 from ._equation import Equation
 from ._errors import EquationError, Error, IdentificationError, SessionError
@@ -28,6 +30,7 @@ from ._shown import Figure, Figures, Table
 from ._trace import Trace
 
 __all__ = [
+    "Analysis",
     "ByTest",
     "Comparison",
     "Compensated",
@@ -50,6 +53,7 @@ __all__ = [
     "Trace",
     "Validation",
     "__version__",
+    "analyse",
     "compare",
     "import_readings",
     "set_threads",

@@ -200,7 +200,7 @@ class Figures(tuple[Figure, ...]):
 class Shown(Record):
     """The result of an analysis, which is shown as tables, figures and a report."""
 
-    _analysis: ClassVar[str]
+    _analysis: str
     """The name of the command."""
     _called: ClassVar[str]
     """What was called in Python."""

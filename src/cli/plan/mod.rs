@@ -23,31 +23,14 @@ pub struct PlanArguments {
     session: SessionArguments,
     #[command(flatten)]
     common: CommonArguments,
-    /// Standard deviation of a reading, µm, instead of the session's.
-    ///
-    /// Example: --noise-um 0.5
-    #[arg(long, value_name = "UM", allow_negative_numbers = true)]
-    noise_um: Option<f64>,
-    /// Standard uncertainty of every set-up length with a prior, instead of the session's.
-    ///
-    /// Example: --setup-um 1
-    #[arg(long, value_name = "UM", allow_negative_numbers = true)]
-    setup_um: Option<f64>,
-    /// Use one mounted spindle ball for all tests.
-    #[arg(long)]
-    one_spindle_ball: bool,
-    /// Use the planned movements even if there are data.
-    #[arg(long)]
-    planned: bool,
+    #[command(flatten)]
+    options: PlanningOptions,
     /// Check the clearance of an R-test device with the table upright: diameters of spindle and table, height and width
     /// of the device, length of the shaft from jig to ball, length of the jig.
     ///
     /// Example: --device-mm 80,320,60,80,150,50
     #[arg(long, value_name = "DS,DT,H,W,L,T", allow_hyphen_values = true, conflicts_with_all = ["improve", "separate", "range"])]
     device_mm: Option<String>,
-    /// Do not screen undeclared effects.
-    #[arg(long)]
-    no_effects: bool,
     #[command(flatten)]
     improve: improve::ImproveArguments,
     #[command(flatten)]
@@ -59,14 +42,6 @@ pub struct PlanArguments {
     range: bool,
 }
 
-impl PlanArguments {
-    /// The options of the analysis, which the commands that a report proposes repeat.
-    fn planning(&self) -> PlanningOptions {
-        let &PlanArguments { noise_um, planned, no_effects, setup_um, one_spindle_ball, .. } = self;
-        PlanningOptions { noise_um, planned, no_effects, setup_um, one_spindle_ball }
-    }
-}
-
 /// Examples of `abbe plan`.
 pub const HELP: &str = include_str!("../help/plan.txt");
 
@@ -76,12 +51,12 @@ pub fn run(arguments: &PlanArguments, _: Global) -> Result<(), Diagnostic> {
     let others = [&arguments.patterns.patterns, &arguments.improve.write];
     let outputs = common.output.prepared(&others.map(Option::as_ref))?;
     // The written session has the mounts and the priors of the file, not those of the command line.
-    arguments.improve.refuse_overrides(arguments.one_spindle_ball || arguments.setup_um.is_some())?;
+    let planning = &arguments.options;
+    arguments.improve.refuse_overrides(planning.one_spindle_ball || planning.setup_um.is_some())?;
     let (mut session, sources) = read_session(&arguments.session, &outputs)?;
-    if let Some(um) = arguments.setup_um {
+    if let Some(um) = planning.setup_um {
         values::length_um("--setup-um", um)?;
     }
-    let planning = arguments.planning();
     planning.set_up(&mut session);
     let session = session;
     let read = Read::session(&session, &sources, common.seed);
@@ -90,9 +65,9 @@ pub fn run(arguments: &PlanArguments, _: Global) -> Result<(), Diagnostic> {
         return common.output.put(&outputs, &report::patterns::report(&session, &found.patterns), &found, &read);
     }
     let options = PlanOptions {
-        noise_mm: arguments.noise_um.map(|um| values::length_um("--noise-um", um)).transpose()?,
-        planned_only: arguments.planned,
-        effects: !arguments.no_effects,
+        noise_mm: planning.noise_um.map(|um| values::length_um("--noise-um", um)).transpose()?,
+        planned_only: planning.planned,
+        effects: !planning.no_effects,
         reach_mm: arguments.improve.candidates.reach_mm()?,
     };
     let problem = problem_of(&session, &options)?;
@@ -113,6 +88,6 @@ pub fn run(arguments: &PlanArguments, _: Global) -> Result<(), Diagnostic> {
     if let Some(sizes) = &arguments.device_mm {
         found.analysis.warnings.extend(set_up::faults(&session, sizes)?);
     }
-    let commands = arguments.session.commands::<Plan>(1, &PlanningOptions { no_effects: false, ..planning })?;
+    let commands = arguments.session.commands::<Plan>(1, &PlanningOptions { no_effects: false, ..planning.clone() })?;
     common.output.put_found(&outputs, &found, &commands, &read)
 }
