@@ -111,13 +111,14 @@ pub type StatedValidation<'r> = Stated<'r, ValidationResult, Statements<Validati
 pub type StatedComparison<'r> = Stated<'r, Comparison, Statements<ComparisonStatement, Difference>>;
 /// A history with its statements.
 #[cfg(feature = "fleet")]
-pub type StatedHistory<'r> = Stated<'r, crate::fleet::history::FleetHistory, crate::fleet::history::HistoryStatements>;
+pub type StatedHistory<'r> =
+    Stated<'r, crate::fleet::history::FleetHistory, crate::fleet::history::statements::HistoryStatements>;
 
 #[cfg(feature = "fleet")]
 impl<'r> StatedHistory<'r> {
     /// Of a history.
     pub fn of_history(result: &'r crate::fleet::history::FleetHistory) -> Self {
-        Stated { statements: crate::fleet::history::statements(&result.history.machines), result }
+        Stated { statements: crate::fleet::history::statements::statements(&result.machines), result }
     }
 }
 

@@ -1,9 +1,9 @@
-//! What follows from an identified model: what to enter in a control, how it is compared, and how it changes.
+//! What follows from an identified model: what to enter in a control, and how it is compared.
 //!
 //! - [`control`]: the controls and what each takes; [`compensation`]: identified error motions as tables of a control;
 //! - [`correction`]: corrected commands;
 //! - [`export`]: a model in the form of a control, a robot or a simulator; [`volumetric`]: the errors over the workspace;
-//! - [`compare`]: two models or sessions of one machine; [`history`]: the parameters of machines over time;
+//! - [`compare`]: two models or sessions of one machine;
 //! - [`geometric`]: the methods of the literature that take circles apart, beside the fit.
 
 #![cfg_attr(
@@ -18,5 +18,4 @@ pub mod correction;
 pub mod error;
 pub mod export;
 pub mod geometric;
-pub mod history;
 pub mod volumetric;

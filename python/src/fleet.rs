@@ -2,9 +2,8 @@
 
 use std::path::PathBuf;
 
-use abbe::apply::history::HistoryOptions;
 use abbe::document::StatedHistory;
-use abbe::fleet::history;
+use abbe::fleet::history::{HistoryOptions, history};
 use abbe::fleet::options::Options;
 use abbe::fleet::store::{IfClaimed, Store};
 use abbe::fleet::unit::{self, Done, Places};
@@ -95,7 +94,7 @@ pub fn fleet_history(
     work::run(py, None, move |_| {
         let known = compensations.map(|file| compensations::read(&file)).transpose()?.unwrap_or_default();
         let options = HistoryOptions { false_discovery_rate, tolerance_u, compensations: known };
-        let found = history::history(&Store::existing(out)?, machine_id.as_deref(), &options)?;
+        let found = history(&Store::existing(out)?, machine_id.as_deref(), &options)?;
         json(&StatedHistory::of_history(&found))
     })
 }

@@ -2,13 +2,29 @@
 
 use std::path::Path;
 
-use abbe_apply::history::events::{Compensation, KnownChange};
-use abbe_model::Diagnostic;
-
 use abbe_files::Source;
+use abbe_model::Diagnostic;
 
 use super::date;
 use super::unusable;
+
+/// The change of an error of a machine by a compensation: the value that its table takes away, with its sign.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Compensation {
+    /// Identifier of the machine.
+    pub machine_id: String,
+    /// When it became active, first and last time: days since the epoch of the sessions. A date without a time is a
+    /// whole day.
+    pub days: [f64; 2],
+    /// The parameter.
+    pub id: String,
+    /// Its change, in `unit`.
+    pub value: f64,
+    /// Unit.
+    pub unit: String,
+    /// Where it is stated: file and line.
+    pub source: String,
+}
 
 /// The columns of the file.
 const COLUMNS: [&str; 5] = ["machine_id", "date", "parameter", "change", "unit"];
@@ -67,18 +83,11 @@ pub fn of_source(source: &Source) -> Result<Vec<Compensation>, Diagnostic> {
         if !row.change.is_finite() {
             return Err(fault(line, format!("change `{}`", row.change), "a number is expected"));
         }
-        let known = found.iter_mut().find(|known| known.machine_id == row.machine_id && known.days == days);
-        let change =
-            KnownChange { id: row.parameter, value: row.change, unit: row.unit, source: format!("{name}:{line}") };
-        match known {
-            Some(known) if known.changes.iter().any(|other| other.id == change.id) => {
-                let (id, date) = (&change.id, &row.date);
-                let found = format!("the change of {id} on {date} is stated twice");
-                return Err(fault(line, found, "remove a row"));
-            }
-            Some(known) => known.changes.push(change),
-            None => found.push(Compensation { machine_id: row.machine_id, days, changes: vec![change] }),
+        let Row { machine_id, date, parameter: id, change: value, unit } = row;
+        if found.iter().any(|known| known.machine_id == machine_id && known.days == days && known.id == id) {
+            return Err(fault(line, format!("the change of {id} on {date} is stated twice"), "remove a row"));
         }
+        found.push(Compensation { machine_id, days, id, value, unit, source: format!("{name}:{line}") });
     }
     Ok(found)
 }

@@ -5,6 +5,8 @@ use abbe_identify::tolerance::{Conformity, ConformityItem};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::history::sessions::{Dated, Machine};
+
 /// The decisions about a machine over time.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct MachineConformity {
@@ -61,18 +63,13 @@ impl ItemHistory {
 }
 
 impl MachineConformity {
-    /// The decisions about a machine: day and file of each session, by time, with its decisions; `None` if no session
-    /// states limits.
-    pub fn of<'c>(
-        machine_id: &str,
-        sessions: impl Iterator<Item = (f64, &'c str, Option<&'c Conformity>)>,
-    ) -> Option<MachineConformity> {
-        let mut found =
-            MachineConformity { machine_id: machine_id.to_string(), sessions: Vec::new(), items: Vec::new() };
-        for (days, file, conformity) in sessions {
-            let Some(Conformity { verdict, items, .. }) = conformity else { continue };
-            found.sessions.push(SessionConformity { days, file: file.to_string(), verdict: *verdict });
-            items.iter().for_each(|item| found.add(days, item));
+    /// The decisions about a machine; `None` if no session states limits.
+    pub fn of(machine: &Machine) -> Option<MachineConformity> {
+        let mut found = MachineConformity { machine_id: machine.id().into(), sessions: Vec::new(), items: Vec::new() };
+        for Dated { days, file, record, .. } in &machine.sessions {
+            let Some(Conformity { verdict, items, .. }) = &record.conformity else { continue };
+            found.sessions.push(SessionConformity { days: *days, file: file.clone(), verdict: *verdict });
+            items.iter().for_each(|item| found.add(*days, item));
         }
         (!found.sessions.is_empty()).then_some(found)
     }

@@ -21,6 +21,7 @@ pub mod record;
 pub mod run;
 pub mod store;
 pub mod unit;
+
 use std::fmt::Display;
 use std::path::Path;
 

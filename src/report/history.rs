@@ -1,11 +1,12 @@
 //! The machines of a fleet over time.
 
-use abbe::apply::history::chart::{EWMA_LIMIT, SHEWHART_LIMIT};
-use abbe::apply::history::events::{ChangeEvent, Kind};
-use abbe::apply::history::results::{Due, MachineHistory, ParameterHistory};
 use abbe::document::StatedHistory;
 use abbe::fleet::conformity::{DecisionPoint, ItemHistory, MachineConformity};
-use abbe::fleet::history::{FleetHistory, HistoryStatements, NotUsed};
+use abbe::fleet::history::chart::{EWMA_LIMIT, SHEWHART_LIMIT};
+use abbe::fleet::history::events::{ChangeEvent, Kind};
+use abbe::fleet::history::results::{Due, MachineHistory, ParameterHistory};
+use abbe::fleet::history::statements::HistoryStatements;
+use abbe::fleet::history::{FleetHistory, NotUsed};
 use abbe::identify::results::{MeasuredValue, ParameterChange};
 use abbe::identify::tolerance::rule::Decision;
 use abbe::model::calendar::date;
@@ -41,7 +42,7 @@ const MAX_ROWS: usize = 12;
 /// The report of the fleet.
 pub fn fleet(stated: &StatedHistory<'_>) -> Report {
     let found = stated.result;
-    let all = &found.history.machines;
+    let all = &found.machines;
     let mut report = Report::new("History of the fleet");
     report.method = METHOD.to_string();
     report.values = values(all);
@@ -142,17 +143,15 @@ fn section(report: &mut Report, heading: &str, table: Table, none: &str) {
 
 /// What was tested, in a sentence.
 fn headline(found: &FleetHistory) -> String {
-    let history = &found.history;
-    let sessions: usize = history.machines.iter().map(|machine| machine.sessions).sum();
-    let changed =
-        history.machines.iter().flat_map(|machine| &machine.parameters).filter(|one| has_changed(one)).count();
+    let sessions: usize = found.machines.iter().map(|machine| machine.sessions).sum();
+    let changed = found.machines.iter().flat_map(|machine| &machine.parameters).filter(|one| has_changed(one)).count();
     format!(
         "{}, {}: {} of {} parameters over time have changed (false discovery rate {})",
-        counted(history.machines.len(), "machine"),
+        counted(found.machines.len(), "machine"),
         counted(sessions, "session"),
         changed,
-        history.tested_series,
-        history.false_discovery_rate
+        found.tested_series,
+        found.false_discovery_rate
     )
 }
 
@@ -194,7 +193,7 @@ fn next_check(machine: &MachineHistory) -> String {
 
 /// The machines, those with the earliest due date first.
 fn machines(found: &FleetHistory) -> Table {
-    let mut sorted: Vec<&MachineHistory> = found.history.machines.iter().collect();
+    let mut sorted: Vec<&MachineHistory> = found.machines.iter().collect();
     let due = |machine: &MachineHistory| machine.due_days.unwrap_or(f64::INFINITY);
     sorted.sort_by(|a, b| due(a).total_cmp(&due(b)).then_with(|| a.machine_id.cmp(&b.machine_id)));
     let rows = sorted.into_iter().map(|machine| {

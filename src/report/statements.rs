@@ -7,7 +7,7 @@ use abbe::apply::compare::ComparisonStatement;
 use abbe::apply::compare::results::{Comparison, Difference};
 use abbe::codegen::nc::has_letters;
 #[cfg(feature = "fleet")]
-use abbe::fleet::history::{ChangedInHistory, HistoryStatements};
+use abbe::fleet::history::statements::{ChangedInHistory, HistoryStatements};
 use abbe::identify::results::{
     AxisCorrection, DeterminedBy, Estimate, GoodStatement, LineQuantity, MeasureStatement, NextStep, NotJudged,
     ParameterChange, Statements,
@@ -504,7 +504,7 @@ mod tests {
     #[cfg(feature = "fleet")]
     #[test]
     fn a_history_clears_what_it_follows_alone() {
-        let statements = crate::fleet::history::statements(&[]);
+        let statements = crate::fleet::history::statements::statements(&[]);
         let said = |followed: usize| of_history(&statements, None, false, (followed, 18)).join("; ");
         assert!(said(18).starts_with("No machine is out of control; What to correct: nothing"), "{}", said(18));
         assert!(said(10).starts_with("No machine is out of control in the 10 of 18 parameters"), "{}", said(10));

@@ -8,10 +8,10 @@
 //! Trips through that cache cost more than arithmetic. A product that is used only by one sum or difference is therefore
 //! fused with it, and two sums over the same operands are one operation.
 
-#[cfg(test)]
-mod check;
 mod compile;
 mod instruction;
+#[cfg(test)]
+mod tests;
 
 use pulp::NullaryFnOnce;
 

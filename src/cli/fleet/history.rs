@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use abbe::apply::history::HistoryOptions;
 use abbe::document::StatedHistory;
 use abbe::files;
 use abbe::fleet::compensations;
-use abbe::fleet::history::{history, statements};
+use abbe::fleet::history::statements::statements;
+use abbe::fleet::history::{HistoryOptions, history};
 use abbe::fleet::store::Store;
 use abbe::model::Diagnostic;
 use clap::Args;
@@ -82,7 +82,7 @@ pub fn run(arguments: &HistoryArguments) -> Result<(), Diagnostic> {
     let found = history(&store, arguments.machine_id.as_deref(), &options)?;
     let read = Read::files(known.iter().filter_map(|source| source.stamp.as_ref()));
     let stated = StatedHistory::of_history(&found);
-    let report = match (&arguments.machine_id, found.history.machines.first()) {
+    let report = match (&arguments.machine_id, found.machines.first()) {
         (Some(_), Some(machine)) => report::machine(machine, &stated.statements, &found.conformity),
         _ => report::fleet(&stated),
     };
@@ -90,7 +90,7 @@ pub fn run(arguments: &HistoryArguments) -> Result<(), Diagnostic> {
     let Some(path) = &arguments.pages else { return Ok(()) };
     let html = |report: &Report| page::html(report, &read.provenance()).map_err(Diagnostic::other);
     let mut files = vec![("index.html".to_string(), html(&report::fleet(&stated))?)];
-    for (number, machine) in found.history.machines.iter().enumerate() {
+    for (number, machine) in found.machines.iter().enumerate() {
         let plain = |sign: char| if sign.is_alphanumeric() || "-_.".contains(sign) { sign } else { '_' };
         let name: String = machine.machine_id.chars().map(plain).take(LONGEST_NAME).collect();
         // The number keeps machines apart whose identifiers differ in other signs or in case alone.

@@ -3,6 +3,5 @@
 pub mod compare_figures;
 pub mod compare_judged;
 pub mod compensation;
-pub mod history_figures;
 pub mod model_commands;
 pub mod volumetric;

@@ -13,4 +13,4 @@ pub(crate) mod step_table;
 pub(crate) mod tuned;
 
 #[cfg(test)]
-mod check;
+mod tests;

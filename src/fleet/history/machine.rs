@@ -7,7 +7,7 @@ use super::HistoryOptions;
 use super::events::{self, Change};
 use super::results::{ChangeResult, Due, MachineHistory, ParameterHistory, PointResult};
 use super::series::Series;
-use super::sessions::{MachineSessions, SessionValues};
+use super::sessions::{Dated, Machine};
 use super::{DAYS_PER_YEAR, chart};
 use abbe_identify::numerics::regression::Regression;
 use abbe_identify::numerics::symmetric::Symmetric;
@@ -28,7 +28,7 @@ struct Terms {
 
 /// A machine with the models of its series.
 pub(super) struct Fitted<'m> {
-    machine: &'m MachineSessions,
+    machine: &'m Machine,
     series: Vec<Series>,
     terms: Vec<Terms>,
 }
@@ -68,7 +68,7 @@ impl Joint {
 
 impl<'m> Fitted<'m> {
     /// A machine with its searched series.
-    pub fn of(machine: &'m MachineSessions, series: Vec<Series>) -> Fitted<'m> {
+    pub fn of(machine: &'m Machine, series: Vec<Series>) -> Fitted<'m> {
         let terms = series
             .iter()
             .map(|series| Terms {
@@ -135,14 +135,14 @@ impl<'m> Fitted<'m> {
 
     /// A root of the inverse covariance of the present series in a session.
     fn whitening(&self, session: usize, present: &[(usize, usize)]) -> Option<Mat<f64>> {
-        let covariance = &self.machine.sessions[session].covariance;
+        let covariance = |i: usize, j: usize| self.machine.covariance(session, i, j);
         let count = present.len();
         let u: Vec<f64> = present.iter().map(|(k, at)| self.series[*k].u[*at]).collect();
         let place = |k: usize| self.series[present[k].0].parameter;
-        let stated = |i: usize| covariance[place(i)][place(i)].sqrt();
+        let stated = |i: usize| covariance(place(i), place(i)).sqrt();
         let correlation = Mat::from_fn(count, count, |i, j| match i == j {
             true => 1.0,
-            false => covariance[place(i)][place(j)] / (stated(i) * stated(j)),
+            false => covariance(place(i), place(j)) / (stated(i) * stated(j)),
         });
         if correlation.col_iter().any(|column| column.iter().any(|entry| !entry.is_finite())) {
             return Some(Mat::from_fn(count, count, |i, j| if i == j { 1.0 / u[i] } else { 0.0 }));
@@ -169,12 +169,13 @@ impl<'m> Fitted<'m> {
             None if present.clone().any(|one| one.due == Due::BeyondTenYears) => Due::BeyondTenYears,
             None => Due::NotDetermined,
         };
-        let days = |session: Option<&SessionValues>| session.map_or(0.0, |session| session.days);
+        let days = |session: Option<&Dated>| session.map_or(0.0, |session| session.days);
         let followed = self.series.iter().filter(|series| series.sessions.last().copied() == last).count();
+        let axes = self.machine.latest().and_then(|record| record.machine.as_ref());
         MachineHistory {
-            machine_id: self.machine.machine_id.clone(),
-            name: self.machine.name.clone(),
-            code: self.machine.code.clone(),
+            machine_id: self.machine.id().to_string(),
+            name: axes.map_or_else(String::new, |machine| machine.name.clone()),
+            code: axes.map_or_else(String::new, |machine| machine.code.clone()),
             sessions: self.machine.sessions.len(),
             first_days: days(self.machine.sessions.first()),
             last_days: days(self.machine.sessions.last()),
@@ -183,9 +184,9 @@ impl<'m> Fitted<'m> {
             due_days: first_due.as_ref().map(|due| due.0),
             due_parameter: first_due.map(|due| due.1),
             followed,
-            determined: self.machine.determined.max(followed),
-            held_at_nominal: self.machine.held_at_nominal.clone(),
-            validation: self.machine.validation,
+            determined: self.machine.determined().max(followed),
+            held_at_nominal: self.machine.held_at_nominal(),
+            validation: self.machine.validation(),
             out_of_control: parameters.iter().filter(|one| one.is_out_of_control()).map(|one| one.id.clone()).collect(),
             parameters,
         }
@@ -193,7 +194,7 @@ impl<'m> Fitted<'m> {
 
     fn parameter(&self, k: usize, joint: Option<&Joint>, options: &HistoryOptions) -> ParameterHistory {
         let series = &self.series[k];
-        let (id, unit, meaning) = &self.machine.parameters[series.parameter];
+        let [id, unit, meaning] = self.machine.named(series.parameter).map(str::to_string);
         let first = joint.map(|joint| (joint, joint.first[k]));
         let drift = first.filter(|_| series.drift).map(|(joint, first)| joint.estimate(first + 1));
         let chart = chart::Charts::of(&series.values, &series.u, &series.steps);
@@ -217,9 +218,9 @@ impl<'m> Fitted<'m> {
         });
         let (due, due_days) = self.due(series, options);
         ParameterHistory {
-            id: id.clone(),
-            unit: unit.clone(),
-            meaning: meaning.clone(),
+            id,
+            unit,
+            meaning,
             points: points.collect(),
             p_value: series.p_value(),
             scatter_ratio: series.scatter,

@@ -9,11 +9,12 @@
 //! The first estimate is that of the differences of neighbouring sessions, which a step enters once; the second is that
 //! about the models which the first one yields, within the segments between steps.
 
-use super::prior::{LEAST_VARIANCE, Prior};
 use super::series::Series;
-use super::sessions::MachineSessions;
+use super::sessions::Machine;
 use abbe_identify::numerics::median;
 
+/// Smallest variance, in units of the stated one: sessions that agree to a millionth of their uncertainties.
+const LEAST_VARIANCE: f64 = 1e-12;
 /// Standard deviation of a normal distribution over its median absolute deviation.
 const NORMAL: f64 = 1.4826;
 /// Degrees of freedom that one difference of neighbouring sessions adds to the median of all: half the inverse square
@@ -27,6 +28,21 @@ const FEWEST_FOR_SPREAD: usize = 4;
 const MANY_MACHINES: usize = 20;
 /// Most degrees of freedom of a prior. The t distribution is normal long before.
 const MOST_FREEDOM: f64 = 1e4;
+
+/// What is known of the variance of a series before its own scatter: that of an estimate with so many degrees of
+/// freedom, in units of the stated variance.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Prior {
+    pub variance: f64,
+    pub freedom: f64,
+}
+
+impl Prior {
+    /// Its sum of squares. A trace remains of none, so that sessions without any scatter have a variance.
+    pub fn sum_of_squares(&self) -> f64 {
+        self.freedom * self.variance + LEAST_VARIANCE
+    }
+}
 
 /// An estimate of a variance.
 #[derive(Clone, Copy)]
@@ -70,7 +86,7 @@ struct Spread {
 }
 
 /// The priors of all series by the differences of neighbouring sessions.
-pub(super) fn priors_of_differences(machines: &[MachineSessions], all: &[Vec<Series>]) -> Vec<Vec<Prior>> {
+pub(super) fn priors_of_differences(machines: &[Machine], all: &[Vec<Series>]) -> Vec<Vec<Prior>> {
     let of_series = |one: &Series| -> Vec<Sample> {
         // The median that is subtracted takes a part of a short series.
         let count = one.values.len() as f64;
@@ -86,7 +102,7 @@ pub(super) fn priors_of_differences(machines: &[MachineSessions], all: &[Vec<Ser
 }
 
 /// The priors of all series by the residuals of their models.
-pub(super) fn priors_of_models(machines: &[MachineSessions], all: &[Vec<Series>]) -> Vec<Vec<Prior>> {
+pub(super) fn priors_of_models(machines: &[Machine], all: &[Vec<Series>]) -> Vec<Vec<Prior>> {
     let of_series = |one: &Series| -> Option<(Sample, f64)> {
         let (sum, freedom) = one.residual()?;
         // The median of χ² (Wilson and Hilferty 1931).
@@ -194,12 +210,10 @@ fn variance_of_logarithm(freedom: f64) -> f64 {
 
 /// For each machine, the share of its series that counts as independent: `n / Σ ρᵢⱼ²`, since the squares of normal
 /// variables with the correlation ρ are correlated by ρ².
-fn shares(machines: &[MachineSessions], all: &[Vec<Series>]) -> Vec<f64> {
-    let share = |(machine, series): (&MachineSessions, &Vec<Series>)| {
-        let entry = |i: usize, j: usize| {
-            let covariance = machine.sessions.last().map(|session| &session.covariance);
-            covariance.and_then(|rows| rows.get(i)?.get(j)).copied().unwrap_or(0.0)
-        };
+fn shares(machines: &[Machine], all: &[Vec<Series>]) -> Vec<f64> {
+    let share = |(machine, series): (&Machine, &Vec<Series>)| {
+        let last = machine.sessions.len().saturating_sub(1);
+        let entry = |i: usize, j: usize| machine.covariance(last, i, j);
         let squared = |i: usize, j: usize| match entry(i, j).powi(2) / (entry(i, i) * entry(j, j)) {
             squared if squared.is_finite() => squared.min(1.0),
             _ => 0.0,

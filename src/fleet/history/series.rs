@@ -5,11 +5,12 @@
 //! residual within the segments beside the prior of the other series, so that a change is no scatter.
 
 use super::DAYS_PER_YEAR;
-use super::prior::Prior;
-use super::sessions::MachineSessions;
+use super::scatter::Prior;
+use super::sessions::Machine;
+use abbe_identify::numerics::median;
 use abbe_identify::numerics::regression::Regression;
 use abbe_identify::numerics::tails::{student_quantile, student_tail};
-use abbe_identify::numerics::{median, parallel};
+use abbe_identify::results::Estimate;
 
 /// Fewest sessions in which a parameter is a series.
 pub(super) const FEWEST: usize = 4;
@@ -72,19 +73,15 @@ pub(super) struct Series {
 }
 
 impl Series {
-    /// The series of each machine of a fleet.
-    pub fn of_fleet(machines: &[MachineSessions]) -> Vec<Vec<Series>> {
-        parallel::map(machines.len(), &|k| Series::of_machine(&machines[k]))
-    }
-
-    fn of_machine(machine: &MachineSessions) -> Vec<Series> {
+    /// The series of a machine.
+    pub fn of_machine(machine: &Machine) -> Vec<Series> {
         let first = machine.sessions.first().map_or(0.0, |session| session.days);
-        (0..machine.parameters.len())
+        (0..machine.count())
             .filter_map(|parameter| {
-                let known = machine.sessions.iter().enumerate().filter_map(|(session, values)| {
-                    let (value, u) = values.values[parameter]?;
+                let known = machine.sessions.iter().enumerate().filter_map(|(session, dated)| {
+                    let Estimate { value, u, .. } = *machine.estimate(parameter, session)?;
                     let usable = value.is_finite() && u.is_finite() && u > 0.0;
-                    usable.then_some((session, (values.days - first) / DAYS_PER_YEAR, value, u))
+                    usable.then_some((session, (dated.days - first) / DAYS_PER_YEAR, value, u))
                 });
                 let known: Vec<_> = known.collect();
                 (known.len() >= FEWEST).then(|| Series::new(parameter, &known))

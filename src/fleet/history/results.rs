@@ -9,19 +9,6 @@ use abbe_trace::validate::ValidationVerdict;
 use super::DAYS_PER_YEAR;
 use super::events::ChangeEvent;
 
-/// The parameters of machines over time.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct History {
-    /// False discovery rate over all series of all machines.
-    pub false_discovery_rate: f64,
-    /// The p value below which a series has a change (Benjamini and Hochberg); 0 if none has.
-    pub p_value_threshold: f64,
-    /// Number of series that were tested.
-    pub tested_series: usize,
-    /// The machines.
-    pub machines: Vec<MachineHistory>,
-}
-
 /// Whether a next check is due, by the drift and its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

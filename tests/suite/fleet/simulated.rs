@@ -1,15 +1,16 @@
 //! Machines with known drifts and steps: how often they are found, and how often something else is.
 
-use faer::Mat;
+use abbe::fleet::compensations::Compensation;
+use abbe::fleet::history::events::{ChangeEvent, Kind};
+use abbe::fleet::history::results::{Due, ParameterHistory};
+use abbe::fleet::history::{DAYS_PER_YEAR, FleetHistory, HistoryOptions};
+use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-use super::events::{ChangeEvent, Compensation, Kind, KnownChange};
-use super::results::{Due, History, ParameterHistory};
-use super::sessions::{MachineSessions, SessionValues};
-use super::{HistoryOptions, analyse};
+use super::machines::{MachineSessions, SessionValues, analyse};
 
 /// Parameters of a machine: eight location errors.
 pub(super) const PARAMETERS: usize = 8;
@@ -30,7 +31,7 @@ pub(super) fn machine_of(
 ) -> MachineSessions {
     let u = |parameter: usize| 0.5 + 0.2 * parameter as f64;
     // Neighbouring parameters are correlated by 0.5: estimates of one set-up.
-    let root = Mat::from_fn(PARAMETERS, PARAMETERS, |i, j| match i as isize - j as isize {
+    let root = DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| match i as isize - j as isize {
         0 if i == 0 => 1.0,
         0 => 0.75_f64.sqrt(),
         1.. => 0.5_f64.powi((i - j) as i32) * if j == 0 { 1.0 } else { 0.75_f64.sqrt() },
@@ -45,15 +46,9 @@ pub(super) fn machine_of(
             let normal: Vec<f64> = (0..PARAMETERS).map(|_| StandardNormal.sample(random)).collect();
             let values = (0..PARAMETERS).map(|i| {
                 let noise: f64 = (0..PARAMETERS).map(|j| root[(i, j)] * normal[j]).sum();
-                Some(((truth(i, days / super::DAYS_PER_YEAR, session) + noise) * u(i), u(i)))
+                Some(((truth(i, days / DAYS_PER_YEAR, session) + noise) * u(i), u(i)))
             });
-            SessionValues {
-                days,
-                until_days: days,
-                file: session.to_string(),
-                values: values.collect(),
-                covariance: covariance.clone(),
-            }
+            SessionValues { days, until_days: days, values: values.collect(), covariance: covariance.clone() }
         })
         .collect();
     let parameters = (0..PARAMETERS).map(|i| (format!("E{i}"), "um".to_string(), String::new())).collect();
@@ -79,7 +74,7 @@ struct Counts {
 }
 
 impl Counts {
-    fn add(&mut self, history: &History, truth: &[[Truth; PARAMETERS]]) {
+    fn add(&mut self, history: &FleetHistory, truth: &[[Truth; PARAMETERS]]) {
         for (machine, truth) in history.machines.iter().zip(truth) {
             for (parameter, truth) in machine.parameters.iter().zip(truth) {
                 let terms = u64::from(parameter.drift_per_year.is_some()) + parameter.steps.len() as u64;
@@ -163,13 +158,16 @@ fn drifts_and_steps_of_a_fleet_are_found() {
 }
 
 /// The table of a compensation half a month before a session.
-fn table(number: usize, session: usize, change: impl Fn(usize) -> f64) -> Compensation {
-    let known = |i| KnownChange { id: format!("E{i}"), value: change(i), unit: "um".into(), source: String::new() };
-    Compensation {
+fn table(number: usize, session: usize, change: impl Fn(usize) -> f64) -> Vec<Compensation> {
+    let row = |i| Compensation {
         machine_id: number.to_string(),
         days: [(session as f64 - 0.5) * 30.4375; 2],
-        changes: (0..PARAMETERS).map(known).collect(),
-    }
+        id: format!("E{i}"),
+        value: change(i),
+        unit: "um".into(),
+        source: String::new(),
+    };
+    (0..PARAMETERS).map(row).collect()
 }
 
 /// Compensations of 4 u of all parameters, whose steps noise moves by a session: each is one change, and named. The
@@ -182,7 +180,7 @@ fn small_compensations_are_named() {
         let at = random.random_range(4..SESSIONS - 3);
         let value = |_: usize, _: f64, session: usize| 4.0 * f64::from(u8::from(session >= at));
         let machines = [machine(number, value, &mut random)];
-        let compensations = vec![table(number, at, |i| 4.0 * (0.5 + 0.2 * i as f64))];
+        let compensations = table(number, at, |i| 4.0 * (0.5 + 0.2 * i as f64));
         let history = analyse(&machines, &HistoryOptions { compensations, ..HistoryOptions::default() });
         let is_named = |change: &ChangeEvent| change.kind == Kind::Compensation;
         named[0] += u64::from(history.machines[0].changes.iter().any(is_named));
@@ -206,14 +204,14 @@ fn a_compensation_between_sparse_sessions_is_named() {
     let own = table(0, 15, |i| if i == 0 { 9.0 * 0.5 } else { 0.0 });
     let days = [one.sessions[14].days, one.sessions[16].days];
     for at in [14.5, 15.5] {
-        let compensations = vec![Compensation { days: [at * 30.4375; 2], ..own.clone() }];
+        let moved = |row: &Compensation| Compensation { days: [at * 30.4375; 2], ..row.clone() };
+        let compensations = own.iter().map(moved).collect();
         let options = HistoryOptions { compensations, ..HistoryOptions::default() };
         let changes = &analyse(std::slice::from_ref(&one), &options).machines[0].changes;
         assert_eq!(changes.len(), 1, "{changes:?}");
         assert_eq!((changes[0].kind, [changes[0].after_days, changes[0].before_days]), (Kind::Compensation, days));
     }
-    let mut other = own.clone();
-    other.changes = vec![KnownChange { id: "E99".into(), value: 5.0, ..KnownChange::default() }];
+    let other = Compensation { id: "E99".into(), value: 5.0, ..own[0].clone() };
     let kinds = |compensations: Vec<Compensation>| -> Vec<Kind> {
         let options = HistoryOptions { compensations, ..HistoryOptions::default() };
         analyse(std::slice::from_ref(&one), &options).machines[0].changes.iter().map(|change| change.kind).collect()
@@ -227,7 +225,7 @@ fn a_table_in_another_direction_is_no_explanation() {
     let mut random = Pcg64::seed_from_u64(13);
     let value = |parameter: usize, _: f64, session: usize| if parameter == 0 && session >= 15 { 6.0 } else { 0.0 };
     let machines = [machine(0, value, &mut random)];
-    let compensations = vec![table(0, 15, |i| if i == 0 { -0.1 } else { 0.0 })];
+    let compensations = table(0, 15, |i| if i == 0 { -0.1 } else { 0.0 });
     let history = analyse(&machines, &HistoryOptions { compensations, ..HistoryOptions::default() });
     let kinds: Vec<Kind> = history.machines[0].changes.iter().map(|change| change.kind).collect();
     assert_eq!(kinds, [Kind::Shift]);
@@ -316,7 +314,7 @@ fn a_large_drift_of_a_small_fleet_is_found() {
     };
     let (mut found, mut others, mut any) = ([0, 0], [0, 0], [0, 0]);
     for _ in 0..number_of_fleets(200) {
-        let changed = |history: &History| -> Vec<bool> {
+        let changed = |history: &FleetHistory| -> Vec<bool> {
             history.machines.iter().flat_map(|machine| &machine.parameters).map(has_change).collect()
         };
         // 9 standard uncertainties a month.
@@ -358,7 +356,7 @@ fn a_compensation_is_told_from_a_collision_by_its_direction() {
             assert_eq!(changes.len(), 1, "{number}: {changes:?}");
             changes[0].kind
         };
-        kinds.push(kind(vec![table]));
+        kinds.push(kind(table));
         untabled.push(kind(Vec::new()));
     }
     for number in 0..20 {

@@ -1,11 +1,14 @@
 //! Every figure of a history, recomputed: least squares over all parameters of a machine by another library, control
 //! charts by their definitions, the next check by its formula, and changes in the metric of their covariance.
 
-use abbe::apply::history::events::{ChangeEvent, Compensation, Kind, KnownChange};
-use abbe::apply::history::results::{Due, MachineHistory, ParameterHistory};
-use abbe::apply::history::{HistoryOptions, MachineSessions, SessionValues, analyse};
+use abbe::fleet::compensations::Compensation;
+use abbe::fleet::history::HistoryOptions;
+use abbe::fleet::history::events::{ChangeEvent, Kind};
+use abbe::fleet::history::results::{Due, MachineHistory, ParameterHistory};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+
+use super::machines::{MachineSessions, SessionValues, analyse};
 
 const SESSIONS: usize = 24;
 const YEAR: f64 = 365.25;
@@ -46,7 +49,6 @@ fn machine(id: &str) -> MachineSessions {
     let sessions = (0..SESSIONS).map(|session| SessionValues {
         days: day(session),
         until_days: day(session) + 1.0,
-        file: format!("{session}.toml"),
         values: (0..4)
             .map(|k| {
                 let value = truth(k, session) + scatter(k, session) * u(k, session);
@@ -63,7 +65,6 @@ fn machine(id: &str) -> MachineSessions {
         code: "w C A b Y X Z t".into(),
         parameters: IDS.map(|id| (id.to_string(), "um".to_string(), format!("meaning of {id}"))).to_vec(),
         sessions: sessions.collect(),
-        ..MachineSessions::default()
     }
 }
 
@@ -325,14 +326,16 @@ fn cosine(metric: &DMatrix<f64>, a: &DVector<f64>, b: &DVector<f64>) -> f64 {
     product(a, b) / (product(a, a) * product(b, b)).sqrt()
 }
 
-fn table(machine: &str, at: f64, changes: &[(&str, f64)]) -> Compensation {
-    let changes = changes.iter().map(|(id, value)| KnownChange {
+fn table(machine: &str, at: f64, changes: &[(&str, f64)]) -> Vec<Compensation> {
+    let row = |(id, value): &(&str, f64)| Compensation {
+        machine_id: machine.into(),
+        days: [at; 2],
         id: id.to_string(),
         value: *value,
         unit: "um".into(),
         source: "table.toml:3".into(),
-    });
-    Compensation { machine_id: machine.into(), days: [at; 2], changes: changes.collect() }
+    };
+    changes.iter().map(row).collect()
 }
 
 #[test]
@@ -367,7 +370,7 @@ fn figures_of_changes_are_in_the_metric_of_their_covariance() {
         table("M1", at, &[("EZ0A", 3.0)]),
     ];
     let to_zero = cosine(&metric, &values, &-before);
-    for compensations in unknown.into_iter().map(|one| vec![one]).chain([Vec::new()]) {
+    for compensations in unknown.into_iter().chain([Vec::new()]) {
         let history = history(compensations.clone(), std::slice::from_ref(&machine));
         assert_eq!(history.changes.len(), 1, "{:?}", history.changes);
         let event = &history.changes[0];
@@ -377,17 +380,15 @@ fn figures_of_changes_are_in_the_metric_of_their_covariance() {
         assert_eq!(event.remainder_chi_square, None, "{compensations:?}");
     }
     for (known, kind) in [
-        (vec![table("M1", at, &own)], None),
-        (vec![table("M1", day(STEP) + 0.5, &as_found)], Some(Kind::Compensation)),
-        (vec![table("M1", day(STEP - 1), &as_found)], Some(Kind::Compensation)),
-        (vec![table("M1", at, &as_found[..2]), table("M1", at, &as_found[2..])], Some(Kind::Compensation)),
-        (vec![table("M1", at, &more), table("M2", at, &more)], None),
-        (vec![table("M1", at, &opposite)], Some(Kind::Shift)),
+        (table("M1", at, &own), None),
+        (table("M1", day(STEP) + 0.5, &as_found), Some(Kind::Compensation)),
+        (table("M1", day(STEP - 1), &as_found), Some(Kind::Compensation)),
+        ([table("M1", at, &as_found[..2]), table("M1", at, &as_found[2..])].concat(), Some(Kind::Compensation)),
+        ([table("M1", at, &more), table("M2", at, &more)].concat(), None),
+        (table("M1", at, &opposite), Some(Kind::Shift)),
     ] {
         let mut stated = DVector::zeros(4);
-        for (id, value) in
-            known.iter().filter(|one| one.machine_id == "M1").flat_map(|one| &one.changes).map(|c| (&c.id, c.value))
-        {
+        for Compensation { id, value, .. } in known.iter().filter(|one| one.machine_id == "M1") {
             stated[IDS.iter().position(|own| own == id).unwrap()] += value;
         }
         let history = history(known, std::slice::from_ref(&machine));

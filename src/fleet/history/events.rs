@@ -4,7 +4,8 @@ use faer::Mat;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::sessions::MachineSessions;
+use super::sessions::Machine;
+use crate::fleet::compensations::Compensation;
 use abbe_identify::numerics::symmetric::Symmetric;
 use abbe_identify::numerics::tails::chi_square_tail;
 use abbe_identify::results::ParameterChange;
@@ -15,31 +16,6 @@ const SIGNIFICANCE: f64 = 0.001;
 const DIRECTION: f64 = 0.9;
 /// Smallest eigenvalue of a correlation matrix that counts.
 const LEAST_EIGENVALUE: f64 = 1e-9;
-
-/// The change of the errors of a machine by a compensation: the values that its tables take away, with their signs.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Compensation {
-    /// Identifier of the machine.
-    pub machine_id: String,
-    /// When it became active, first and last time: days since the epoch of the sessions. A date without a time is a
-    /// whole day.
-    pub days: [f64; 2],
-    /// Change of each error.
-    pub changes: Vec<KnownChange>,
-}
-
-/// The change of an error by a compensation.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct KnownChange {
-    /// The parameter.
-    pub id: String,
-    /// Its change, in `unit`.
-    pub value: f64,
-    /// Unit.
-    pub unit: String,
-    /// Where it is stated: file and line.
-    pub source: String,
-}
 
 /// What a change is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
@@ -128,15 +104,15 @@ impl Metric {
 
 impl Change {
     /// The change with what it is.
-    pub fn event(&self, machine: &MachineSessions, compensations: &[Compensation]) -> ChangeEvent {
+    pub fn event(&self, machine: &Machine, compensations: &[Compensation]) -> ChangeEvent {
         let count = self.values.len();
         let metric = Metric::of(&self.covariance)
             .unwrap_or_else(|| Metric { root: Mat::from_fn(count, count, |i, j| f64::from(u8::from(i == j))) });
-        let is_of_change =
-            |known: &KnownChange| self.parameters.iter().any(|parameter| machine.parameters[*parameter].0 == known.id);
+        let [names, units]: [Vec<&str>; 2] =
+            [0, 1].map(|k| self.parameters.iter().map(|parameter| machine.named(*parameter)[k]).collect());
         let known: Vec<&Compensation> = compensations
             .iter()
-            .filter(|known| known.machine_id == machine.machine_id && known.changes.iter().any(is_of_change))
+            .filter(|known| known.machine_id == machine.id() && names.contains(&known.id.as_str()))
             .filter(|known| known.days[0] <= self.possible_days[1] && known.days[1] >= self.possible_days[0])
             .collect();
         let chi_square = metric.product(&self.values, &self.values);
@@ -146,7 +122,8 @@ impl Change {
             let cosine = metric.cosine(&self.values, &to_zero);
             (if cosine >= DIRECTION { Kind::Correction } else { Kind::Shift }, cosine, None)
         } else {
-            let expected = self.expected(machine, &known);
+            let change = |id: &str| known.iter().filter(|known| known.id == id).map(|known| known.value).sum();
+            let expected: Vec<f64> = names.iter().map(|id| change(id)).collect();
             let rest: Vec<f64> = self.values.iter().zip(&expected).map(|(found, known)| found - known).collect();
             let remainder = metric.product(&rest, &rest);
             let cosine = metric.cosine(&self.values, &expected);
@@ -157,7 +134,6 @@ impl Change {
             };
             (kind, cosine, Some(remainder))
         };
-        let name = |parameter: usize| machine.parameters[parameter].0.clone();
         ChangeEvent {
             after_days: self.after_days,
             before_days: self.before_days,
@@ -166,24 +142,15 @@ impl Change {
             chi_square,
             remainder_chi_square: remainder,
             degrees_of_freedom: count,
-            parameters: self.found.iter().map(|parameter| name(*parameter)).collect(),
+            parameters: self.found.iter().map(|parameter| machine.named(*parameter)[0].to_string()).collect(),
             changes: (0..count)
                 .map(|k| ParameterChange {
-                    id: name(self.parameters[k]),
+                    id: names[k].to_string(),
                     value: self.values[k],
                     u: self.covariance[(k, k)].max(0.0).sqrt(),
-                    unit: machine.parameters[self.parameters[k]].1.clone(),
+                    unit: units[k].to_string(),
                 })
                 .collect(),
         }
-    }
-
-    /// The change of each parameter by known compensations.
-    fn expected(&self, machine: &MachineSessions, known: &[&Compensation]) -> Vec<f64> {
-        let change = |id: &str| {
-            let all = known.iter().flat_map(|known| &known.changes);
-            all.filter(|known| known.id == id).map(|known| known.value).sum::<f64>()
-        };
-        self.parameters.iter().map(|parameter| change(&machine.parameters[*parameter].0)).collect()
     }
 }

@@ -1,12 +1,12 @@
 //! Simulated machines with few sessions: steps that are found, and claims of machines without a change.
 
+use abbe::fleet::history::HistoryOptions;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
-use super::sessions::MachineSessions;
+use super::machines::{MachineSessions, analyse};
 use super::simulated::{PARAMETERS, consistent, has_change, machine, machine_of, number_of_fleets};
-use super::{HistoryOptions, analyse};
 
 /// Ten sessions with a step of 600 u, of one parameter or of all, in a fleet of one machine with one or eight
 /// parameters. It stood as scatter once.
