@@ -9,7 +9,7 @@
 mod figures;
 pub(crate) mod folds;
 mod joint_space;
-mod left_out_test;
+mod left_out;
 
 use abbe_model::Diagnostic;
 use faer::Mat;
@@ -23,7 +23,7 @@ use crate::problem::Problem;
 pub use figures::cross_validation;
 pub use folds::{FoldKind, Folds, mislabelled_runs};
 pub use joint_space::{coordinates, nearest_of};
-pub use left_out_test::{LeftOutTests, NotLeftOut, left_out_tests};
+pub use left_out::{LeftOutTests, NotLeftOut, left_out_tests};
 
 /// Held-out residuals.
 #[derive(Clone, Debug)]

@@ -11,7 +11,7 @@ use abbe_files::{ReadOptions, session as read};
 use abbe_model::session::Session;
 use abbe_plan::design::Goal;
 use abbe_plan::improve::{ImproveOptions, improve};
-use abbe_plan::test_variations::TestVariations;
+use abbe_plan::variations::TestVariations;
 use abbe_plan::{PlanOptions, analyse, prepared, states};
 use criterion::{Criterion, criterion_group, criterion_main};
 

@@ -3,7 +3,7 @@
 use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::Session;
 
-use super::test_variations::TestVariations;
+use super::variations::TestVariations;
 
 /// Distance below which a ball position counts as one that is already mounted, mm.
 const SAME_POSITION_MM: f64 = 0.5;

@@ -1,9 +1,9 @@
 //! The information of every candidate test, evaluated once.
 
-use super::candidate_tests::CandidateTest;
+use super::candidates::CandidateTest;
 use super::design::information::{Root, SharedParameters, sum_of};
 use super::design::{Design, Goal};
-use super::test_variations::TestVariations;
+use super::variations::TestVariations;
 use abbe_identify::linear::Linearisation;
 use abbe_identify::numerics::parallel;
 use abbe_identify::numerics::triangle::Triangle;

@@ -11,7 +11,7 @@ use abbe_model::words::{counted, listed};
 
 use super::ball_positions::{BallPosition, axis_positions, ball_count, ball_positions, dot, norm, standing_positions};
 use super::sweep::sweep_of;
-use super::test_variations::TestVariations;
+use super::variations::TestVariations;
 
 /// Least radius about the swept axis, mm. At smaller radii the bar hardly moves.
 const MIN_RADIUS_MM: f64 = 10.0;

@@ -29,7 +29,7 @@ use abbe_model::words::{listed, number};
 
 use super::ball_positions::{BallPosition, axis_positions, ball_count, ball_positions, dot, standing_positions};
 use super::candidate_layout::{Draft, MAX_DRAFTS, too_many};
-use super::test_variations::TestVariations;
+use super::variations::TestVariations;
 
 /// The name of a candidate, and of what is mounted for it.
 const PROPOSED: &str = "proposed";

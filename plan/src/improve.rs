@@ -2,8 +2,8 @@
 
 use abbe_identify::error;
 use abbe_model::Diagnostic;
+use abbe_model::document::measurement::Test as Document;
 use abbe_model::document::print::Block;
-use abbe_model::document::test::Test as Document;
 use abbe_model::parameter_id::ParameterId;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -13,7 +13,7 @@ use super::design::exchange::is_no_gain;
 use super::design::information::{Root, SharedParameters};
 use super::design::{Design, Goal, bound};
 use super::proposal::{self, proposal};
-use super::test_variations::TestVariations;
+use super::variations::TestVariations;
 use abbe_identify::numerics::ranking::smallest_first;
 use abbe_identify::problem::Problem;
 use abbe_trace::candidates::named;
@@ -146,7 +146,7 @@ pub fn improve(
     options: &ImproveOptions,
 ) -> Result<Improvement, Diagnostic> {
     let list = &problem.parameters.list;
-    let tests = super::candidate_tests::candidate_tests(&problem.session, variations)?;
+    let tests = super::candidates::candidate_tests(&problem.session, variations)?;
     let nominal = vec![0.0; list.len()];
     let targets = options.goal.targets(problem);
     if targets.is_empty() {

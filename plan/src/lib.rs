@@ -5,7 +5,7 @@
 //!
 //! - [`analyse`]: uncertainties, budgets, identifiability, indices, and the contribution of each test;
 //! - [`effects`]: detectability and bias of undeclared effects; [`bias`]: the bias by each undeclared effect;
-//! - [`test_variations`], [`candidate_tests`], [`mod@improve`], [`separate`], [`mod@separating_tests`],
+//! - [`variations`], [`candidates`], [`mod@improve`], [`separate`], [`aliases`],
 //!   [`mod@proposal`]: the next test; [`mod@range`]: how far a sweep can shrink;
 //! - [`states`], [`sensitivity`], [`budget`], [`indices`], [`structure`]: the parts of the analysis;
 //! - [`design`]: the engine of optimal design behind next test, separating test and poses;
@@ -19,6 +19,7 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::todo)
 )]
 
+pub mod aliases;
 mod analysis;
 mod ball_positions;
 pub mod bias;
@@ -26,7 +27,7 @@ pub mod budget;
 pub(crate) mod candidate_information;
 mod candidate_layout;
 mod candidate_motions;
-pub mod candidate_tests;
+pub mod candidates;
 pub mod clearance;
 pub mod collision;
 pub mod design;
@@ -36,20 +37,19 @@ pub mod error;
 pub mod global;
 pub mod improve;
 pub mod indices;
-pub mod next_test;
+pub mod next;
 pub mod poses;
 pub mod proposal;
 pub mod range;
 pub mod results;
 pub mod sensitivity;
 pub mod separate;
-pub mod separating_tests;
 pub mod sheet;
 mod statements;
 pub mod states;
 pub mod structure;
 mod sweep;
-pub mod test_variations;
+pub mod variations;
 
 pub use analysis::{PlanOptions, analyse, prepared};
 pub use separate::{SeparatingTest, SeparationAnalysis, separating_tests, separation};

@@ -1,12 +1,12 @@
 //! Proposed tests as documents of a session.
 
+use abbe_model::document::measurement::Test as Document;
 use abbe_model::document::of_domain;
 use abbe_model::document::print::Block;
-use abbe_model::document::test::Test as Document;
 use abbe_model::instrument::SharedBy;
 use abbe_model::session::{Session, Test};
 
-use super::test_variations::TestVariations;
+use super::variations::TestVariations;
 
 /// No proposal.
 pub fn none() -> Block<Document> {

@@ -16,7 +16,7 @@ use super::candidate_information::PreparedCandidates;
 use super::design::goal;
 use super::design::information::{Root, SharedParameters};
 use super::states;
-use super::test_variations::TestVariations;
+use super::variations::TestVariations;
 use abbe_identify::numerics::parallel;
 use abbe_identify::numerics::ranking::{rounded, smallest_first};
 use abbe_identify::numerics::triangle::upper;
@@ -199,7 +199,7 @@ impl SeparationComparison {
         let targets: Vec<usize> =
             (0..all.parameters.list.len()).filter(|j| effect_of(*j).is_some() && effect_of(*j) == found_at).collect();
         let variations = &variations.clone().for_effects(std::iter::once(found).chain(alternatives));
-        let tests = super::candidate_tests::candidate_tests(&all.session, variations)?;
+        let tests = super::candidates::candidate_tests(&all.session, variations)?;
         let prepared = PreparedCandidates::new(&all, &values, tests, variations, &targets)?;
         // An alternative that is part of the model always remains in it.
         let is_added = |effect: usize| effect >= known && Some(effect) != found_at;

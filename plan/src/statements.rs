@@ -13,7 +13,7 @@ use crate::design::Goal;
 use crate::improve::{ImproveOptions, improve};
 use crate::results::{Contribution, ErrorAnalysis, PlanAnalysis};
 use crate::states;
-use crate::test_variations::TestVariations;
+use crate::variations::TestVariations;
 
 /// Whether a plan is good.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]

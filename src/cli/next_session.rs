@@ -6,8 +6,8 @@ use abbe::files::SourceMap;
 use abbe::model::Diagnostic;
 use abbe::model::chain::Machine;
 use abbe::model::document::edit::SessionText;
+use abbe::model::document::measurement::Test;
 use abbe::model::document::print::Block;
-use abbe::model::document::test::Test;
 use abbe::trace::TraceOutcome;
 use abbe::trace::result::TraceResult;
 

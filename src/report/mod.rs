@@ -1,7 +1,7 @@
 //! Results as tables, figures and text. Nothing here computes a result, prints one, or knows an option.
 //!
 //! - [`block`]: a report as blocks; [`table`]: a table as data; [`number`]: digits and units; [`figure`]: plots;
-//! - one file per result: [`fit`], [`base`], [`trace`], [`validate`], [`plan`], [`next_test`], [`mod@poses`], [`method`],
+//! - one file per result: [`fit`], [`base`], [`trace`], [`validate`], [`plan`], [`next`], [`mod@poses`], [`method`],
 //!   [`repeated`], [`self_calibration`], [`simulation`], [`patterns`], [`volumetric`], [`compare`], [`compensate`],
 //!   [`compensation`], [`export`], [`import`], [`nc`], `history`, `run`;
 //! - parts of several results: [`statements`], [`quality`], [`parameters`], [`effects`], [`confounded`],
@@ -29,7 +29,7 @@ pub mod history;
 pub mod import;
 pub mod method;
 pub mod nc;
-pub mod next_test;
+pub mod next;
 pub mod number;
 pub mod paper;
 pub mod parameters;

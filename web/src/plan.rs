@@ -17,7 +17,7 @@ use abbe::model::frames::Point;
 use abbe::model::session::Test;
 use abbe::plan::design::Goal;
 use abbe::plan::improve::{ImproveOptions, improve};
-use abbe::plan::test_variations::TestVariations;
+use abbe::plan::variations::TestVariations;
 use abbe::plan::{self, PlanOptions};
 use serde_json::{Value, json};
 use wasm_bindgen::prelude::*;

@@ -5,8 +5,8 @@ mod effect;
 mod head;
 mod layout;
 mod machine;
+mod measurement;
 mod movement;
-mod test;
 mod tolerance;
 
 use std::collections::BTreeSet;
@@ -115,7 +115,7 @@ pub(crate) fn head(
 pub(crate) struct Parts<'d> {
     pub format: Option<&'d abbe_model::document::layout::Format>,
     pub columns: Option<&'d abbe_model::document::layout::Columns>,
-    pub test: &'d [abbe_model::document::test::Test],
+    pub test: &'d [abbe_model::document::measurement::Test],
     pub effect: &'d [effect_document::Effect],
     pub socket_distance: &'d [Node],
     pub tolerance: Option<&'d abbe_model::document::tolerance::Tolerance>,
@@ -159,7 +159,7 @@ pub(crate) fn add(session: &mut Session, document: Parts<'_>, surroundings: &Sur
     // Their data files are read side by side. Errors and warnings are in the order of the tests.
     let read = document.test.par_iter().enumerate().map(|(item, document)| {
         let mut found = Found::default();
-        test::tests(&context, item, document, &mut found).map(|parts| (parts, found))
+        measurement::tests(&context, item, document, &mut found).map(|parts| (parts, found))
     });
     let read: Vec<Result<_, Fault>> = read.collect();
     for ((item, document), read) in document.test.iter().enumerate().zip(read) {

@@ -9,7 +9,7 @@
 
 use abbe_model::Diagnostic;
 
-use super::left_out_test::{LeftOutTests, left_out_tests};
+use super::left_out::{LeftOutTests, left_out_tests};
 use super::{FoldKind, held_out, stated_rms_mm};
 use crate::fit::Fit;
 use crate::problem::Problem;

@@ -15,13 +15,13 @@ pub mod fault;
 pub mod kind;
 pub mod layout;
 pub mod machine;
+pub mod measurement;
 pub mod movement;
 pub mod node;
 pub mod of_domain;
 pub mod print;
 pub mod schema;
 pub mod session;
-pub mod test;
 pub mod tolerance;
 pub mod value;
 

@@ -3,9 +3,9 @@
 use super::effect::{self, SCALES};
 use super::kind::Kind;
 use super::machine::{Axis, Machine};
+use super::measurement::Test;
 use super::movement::{Circle, Follow, Line, Path, Sweep};
 use super::node::Named;
-use super::test::Test;
 use super::value::{Positive, Three};
 use crate::axis::AxisKind;
 use crate::driver::DriverUnit;

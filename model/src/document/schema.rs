@@ -7,9 +7,9 @@ use serde_json::{Map, Value, json};
 
 use super::fault::Step;
 use super::machine::Machine;
+use super::measurement::Test;
 use super::movement::{Circle, Follow, Line, Sweep};
 use super::session::Session;
-use super::test::Test;
 use crate::driver::{Driver, unit_suffixes};
 use crate::effect::keys::{Key, KeyForm};
 use crate::effect::shape::{Entry, SHAPES};

@@ -7,8 +7,8 @@ use super::effect::Effect;
 use super::kind::Kind;
 use super::layout::{Columns, Format};
 use super::machine::Machine;
+use super::measurement::Test;
 use super::node::{Entries, Named, Node};
-use super::test::Test;
 use super::tolerance::Tolerance;
 use super::value::{NotNegative, Note, Positive};
 

@@ -8,7 +8,7 @@ mod set_up;
 use abbe::analysis::{Plan, PlanningOptions, problem_of};
 use abbe::model::Diagnostic;
 use abbe::plan::PlanOptions;
-use abbe::plan::next_test::NextTest;
+use abbe::plan::next::NextTest;
 use abbe::plan::range::shrinkages;
 use clap::Args;
 
@@ -82,7 +82,7 @@ pub fn run(arguments: &PlanArguments, _: Global) -> Result<(), Diagnostic> {
         }
         let ranges = if arguments.range { shrinkages(&problem)? } else { Vec::new() };
         let found = NextTest::new(&problem, improvement, ranges);
-        return common.output.put(&outputs, &report::next_test::report(&problem, &found), &found, &read);
+        return common.output.put(&outputs, &report::next::report(&problem, &found), &found, &read);
     }
     let mut found = Plan::of(&session, problem, &options)?;
     if let Some(sizes) = &arguments.device_mm {

@@ -14,9 +14,9 @@ use abbe::model::driver::Driver;
 use abbe::model::effect::shape::{Harmonic, Local};
 use abbe::model::effect::{Component, Effect, Shape};
 use abbe::model::session::Session;
-use abbe::plan::candidate_tests::candidate_tests;
-use abbe::plan::separating_tests::separate_aliases;
-use abbe::plan::test_variations::TestVariations;
+use abbe::plan::aliases::separate_aliases;
+use abbe::plan::candidates::candidate_tests;
+use abbe::plan::variations::TestVariations;
 use abbe::trace::result::EffectName;
 use abbe::trace::{TraceOptions, trace};
 

@@ -5,10 +5,10 @@ use abbe::model::effect::shape::Harmonic;
 use abbe::model::effect::{Component, Effect, Shape};
 use abbe::model::instrument::Station;
 use abbe::model::session::{Prior, Session};
-use abbe::plan::candidate_tests::candidate_tests;
+use abbe::plan::candidates::candidate_tests;
 use abbe::plan::design::Goal;
 use abbe::plan::improve::{ImproveOptions, improve};
-use abbe::plan::test_variations::TestVariations;
+use abbe::plan::variations::TestVariations;
 use abbe::plan::{PlanOptions, analyse, separation, states};
 
 use crate::suite::plan::help::{machine, noise_um, ready, session};

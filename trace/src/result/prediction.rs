@@ -1,7 +1,7 @@
 //! Left-out tests of a found effect and its aliases.
 //!
 //! Aliases explain the readings equally well. An effect that is attributed to the right component also predicts a test
-//! that it was not fitted on ([`abbe_identify::heldout::left_out_test`]). Each alias therefore replaces the found effect in the
+//! that it was not fitted on ([`abbe_identify::heldout::left_out_tests`]). Each alias therefore replaces the found effect in the
 //! model, and both predict the tests that the others identify. Aliases whose sums of squares differ by less than the
 //! confounding margin keep their order.
 

@@ -1,7 +1,7 @@
 //! The candidate tests of `abbe plan --improve`.
 
 use abbe::model::Diagnostic;
-use abbe::plan::test_variations::TestVariations;
+use abbe::plan::variations::TestVariations;
 use clap::Args;
 
 use crate::cli::values::{self, Words};

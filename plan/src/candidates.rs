@@ -17,7 +17,7 @@ use super::candidate_layout::{Draft, MAX_DRAFTS, draft_count, drafts, too_many};
 use super::candidate_motions;
 use super::collision::{Bodies, Parts};
 use super::states;
-use super::test_variations::TestVariations;
+use super::variations::TestVariations;
 use crate::error::NO_CANDIDATE_TEST;
 use abbe_identify::numerics::parallel;
 

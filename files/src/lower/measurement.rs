@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::document::fault::{Fault, Within};
+use abbe_model::document::measurement as document;
 use abbe_model::document::node::{Named, Node};
 use abbe_model::document::schema;
-use abbe_model::document::test as document;
 use abbe_model::document::value;
 use abbe_model::instrument::set_up::SetUp;
 use abbe_model::instrument::{InstrumentKind, Station, kinds};

@@ -2,14 +2,14 @@
 
 use abbe_identify::error::INTERRUPTED;
 use abbe_model::Diagnostic;
+use abbe_model::document::measurement::Test as Document;
 use abbe_model::document::print::Block;
-use abbe_model::document::test::Test as Document;
 use abbe_model::effect::Effect;
 
 use crate::error::{NO_CANDIDATE_TEST, TOO_MANY};
 use crate::proposal::{self, proposal};
 use crate::separate::{AlternativeSeparation, SeparatingTest, separating_tests};
-use crate::test_variations::TestVariations;
+use crate::variations::TestVariations;
 use abbe_trace::interrupt::Interrupt;
 use abbe_trace::result::effect_name;
 use abbe_trace::result::{AlternativeResult, EffectResult, SeparatingTestResult, SeparationResult};
