@@ -15,7 +15,6 @@ use std::cmp::Reverse;
 
 use abbe_model::Diagnostic;
 use abbe_model::frames::Point;
-use abbe_model::instrument::displaced;
 use abbe_model::scalar::Scalar;
 use num_rational::BigRational;
 use num_traits::{One, Signed};
@@ -72,15 +71,13 @@ pub(crate) fn groups<'a>(
     ring.hold(held);
     let machine = run.machine;
     let unknown = |slot: usize| run.unknown(slot);
-    let p: Vec<usize> = (0..machine.workpiece_side).collect();
-    let q: Vec<usize> = (machine.workpiece_side..machine.axes.len()).rev().collect();
-    let sides =
-        [(displaced(station.workpiece_ball, 0, &unknown), p), (displaced(station.spindle_ball, 3, &unknown), q)];
+    let sides = [(&station.workpiece_ball, 0), (&station.spindle_ball, 3)];
     let mut offsets: [Sum; 3] = Default::default();
     let mut lengths: Vec<(bool, Term, [Sum; 3])> = Vec::new();
-    for (minus, (ball, axes)) in [false, true].into_iter().zip(sides) {
-        let affine = axes.iter().map(|axis| affine(run, &mut ring, *axis)).collect::<Result<Vec<_>, _>>()?;
-        let [main, mut rest] = split(&mut ring, ball)?;
+    for (minus, (ball, first)) in [false, true].into_iter().zip(sides) {
+        let axes = machine.carriers(ball.frame);
+        let affine = axes.map(|axis| affine(run, &mut ring, axis)).collect::<Result<Vec<_>, _>>()?;
+        let [main, mut rest] = split(&mut ring, ball.displaced(first, &unknown))?;
         for axis in &affine {
             rest = moved(&ring, axis, &rest, true);
         }

@@ -2,7 +2,7 @@
 
 use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
-use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
+use abbe_model::chain::{AxisPosition, BodyErrors, Machine, MachineState};
 use abbe_model::frames::{Point, SinCos};
 use abbe_model::instrument::ballbar;
 use abbe_model::instrument::probe::ProbeGeometry;
@@ -142,7 +142,8 @@ impl<'m, S: Scalar> Run<'m, S> {
     /// The geometry of a probe's reading; `None` for any other subject.
     pub(crate) fn probe_geometry(&self) -> Option<ProbeGeometry<S>> {
         let probe = self.subject.probe()?;
-        Some(probe.geometry(self.machine, &self.state, &self.errors, |slot| self.unknown(slot)))
+        let at = MachineState { machine: self.machine, state: &self.state, errors: &self.errors };
+        Some(probe.geometry(at, |slot| self.unknown(slot)))
     }
 
     /// The coordinates of the reading.

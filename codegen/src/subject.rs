@@ -1,6 +1,6 @@
 //! The quantity that an equation describes: a reading of an instrument, or the error vector of the tool.
 
-use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
+use abbe_model::chain::{AxisPosition, BodyErrors, Frame, Machine};
 use abbe_model::frames::Point;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::probe::Probe;
@@ -114,8 +114,8 @@ impl<N: Nominal> Subject<N> {
             Subject::Volumetric { tool } => {
                 let none = vec![BodyErrors::<S>::NONE; machine.axes.len()];
                 let seen = |errors: &[BodyErrors<S>]| {
-                    let in_r = machine.tool_point(state, errors, Point::nominal(*tool));
-                    machine.table_point(state, errors, in_r)
+                    let in_r = machine.in_r(Frame::Tool, state, errors, Point::nominal(*tool));
+                    machine.in_frame(Frame::Table, state, errors, in_r)
                 };
                 seen(errors).minus(seen(&none)).0.to_vec()
             }

@@ -6,10 +6,10 @@
 use std::collections::HashMap;
 
 use abbe_model::axis::AxisKind;
-use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
+use abbe_model::chain::{AxisPosition, BodyErrors, Frame, Machine, MachineState};
 use abbe_model::frames::Point;
+use abbe_model::instrument::probe;
 use abbe_model::instrument::rtest::Setting;
-use abbe_model::instrument::{displaced, probe};
 use abbe_model::scalar::Nominal;
 
 use crate::program::Label;
@@ -54,21 +54,22 @@ pub(crate) fn of_subject<'a>(
     let walk = Walk { machine, state, errors };
     let station = match subject {
         Subject::Station(station) => station,
-        Subject::Volumetric { tool } => return walk.on_tool_side(("q", "tool point"), Point::nominal(*tool)),
+        Subject::Volumetric { tool } => return walk.outwards(("q", "tool point"), Frame::Tool, Point::nominal(*tool)),
     };
     if let Some(probe) = station.probe() {
-        let stylus = displaced(probe.stylus, probe::STYLUS, unknown);
-        let mut vectors = walk.on_tool_side(("q", "stylus"), stylus);
-        let stylus = machine.tool_point(state, errors, stylus);
+        let frame = probe.stylus.frame;
+        let stylus = probe.stylus.displaced(probe::STYLUS, unknown);
+        let mut vectors = walk.outwards(("q", "stylus"), frame, stylus);
+        let stylus = machine.in_r(frame, state, errors, stylus);
         let (step, _) = probe.step_at(machine, state);
         let meaning = match probe.direction {
             Some(_) => "step of the probe in R, 1 mm in the stated direction",
             None => "step of the probe in R, all the way to the artefact's nominal axis",
         };
         vectors.push(named("n", step, meaning));
-        vectors.extend(walk.through_the_table(("q", "stylus"), stylus));
-        vectors.extend(walk.through_the_table(("r", "a step ahead"), stylus.plus(step)));
-        let geometry = probe.geometry(machine, state, errors, unknown);
+        vectors.extend(walk.inwards(("q", "stylus"), probe.artefact.frame, stylus));
+        vectors.extend(walk.inwards(("r", "a step ahead"), probe.artefact.frame, stylus.plus(step)));
+        let geometry = probe.geometry(MachineState { machine, state, errors }, unknown);
         let meaning = "position of the stylus perpendicular to the artefact's axis";
         vectors.push(named("v", geometry.stylus, meaning));
         vectors.push(named("u", geometry.step, "the step perpendicular to the artefact's axis"));
@@ -79,13 +80,21 @@ pub(crate) fn of_subject<'a>(
     // The point of an R-test that carries the sensors is the origin of the difference.
     let carrier = station.rtest().map(|rtest| rtest.setting);
     if let Some(point) = on_table.filter(|_| carrier != Some(Setting::Table)) {
-        vectors.extend(walk.on_workpiece_side(("p", point.name), displaced(*point.mm, point.first, unknown)));
+        vectors.extend(walk.outwards(
+            ("p", point.name),
+            point.target.frame,
+            point.target.displaced(point.first, unknown),
+        ));
     }
     if let Some(point) = on_tool.filter(|_| carrier != Some(Setting::Spindle)) {
-        vectors.extend(walk.on_tool_side(("q", point.name), displaced(*point.mm, point.first, unknown)));
+        vectors.extend(walk.outwards(
+            ("q", point.name),
+            point.target.frame,
+            point.target.displaced(point.first, unknown),
+        ));
     }
     if let Some(bar) = station.bar() {
-        let (p, q) = bar.balls(machine, state, errors, unknown);
+        let (p, q) = bar.balls(MachineState { machine, state, errors }, unknown);
         vectors.push(named("b", p.minus(q), "bar, from the spindle ball to the workpiece ball, in R"));
     }
     vectors
@@ -110,11 +119,11 @@ struct Walk<'w, 'a> {
 }
 
 impl<'a> Walk<'_, 'a> {
-    /// From R into the table frame.
-    fn through_the_table(&self, (letter, body): Body, point: Point<Symbol<'a>>) -> Vec<NamedVector> {
+    /// From R into a frame.
+    fn inwards(&self, (letter, body): Body, frame: Frame, point: Point<Symbol<'a>>) -> Vec<NamedVector> {
         let mut vectors: Vec<NamedVector> = Vec::new();
         let mut point = point;
-        for index in (0..self.machine.workpiece_side).rev() {
+        for index in self.machine.carriers(frame).rev() {
             let pulled = self.machine.pull(index, self.state, self.errors, point);
             if pulled != point {
                 let axis = &self.machine.axes[index].name;
@@ -128,32 +137,15 @@ impl<'a> Walk<'_, 'a> {
         vectors
     }
 
-    fn on_workpiece_side(&self, body: Body, point: Point<Symbol<'a>>) -> Vec<NamedVector> {
-        let count = self.machine.workpiece_side;
-        self.along(body, point, (0..count).map(|index| (index, Some(index + 1).filter(|outside| *outside < count))))
-    }
-
-    fn on_tool_side(&self, body: Body, point: Point<Symbol<'a>>) -> Vec<NamedVector> {
-        let first = self.machine.workpiece_side;
-        let outside = |index: usize| index.checked_sub(1).filter(|outside| *outside >= first);
-        let axes = (first..self.machine.axes.len()).rev();
-        self.along(body, point, axes.map(|index| (index, outside(index))))
-    }
-
-    /// The point after each step; `steps` gives the axis of the step and the axis in whose frame the point then is.
-    fn along(
-        &self,
-        (letter, body): Body,
-        point: Point<Symbol<'a>>,
-        steps: impl Iterator<Item = (usize, Option<usize>)>,
-    ) -> Vec<NamedVector> {
+    /// From a frame to R: the point after each step.
+    fn outwards(&self, (letter, body): Body, frame: Frame, point: Point<Symbol<'a>>) -> Vec<NamedVector> {
         let machine = self.machine;
         let mut vectors: Vec<NamedVector> = Vec::new();
         let start = point.0.map(Symbol::operand);
         let mut point = point;
-        for (index, outside) in steps {
+        for index in machine.carriers(frame) {
             let axis = &machine.axes[index];
-            let outside = outside.map(|outside| &machine.axes[outside].name);
+            let outside = machine.carrier(index).map(|outside| &machine.axes[outside].name);
             let frame = outside.cloned().unwrap_or_else(|| "R".to_string());
             let in_frame = outside.map_or_else(|| "R".to_string(), |name| format!("the frame of axis {name}"));
             let mut add = |point: Point<Symbol<'a>>, prime: bool, meaning: String| {

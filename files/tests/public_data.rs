@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use abbe_files::ReadOptions;
-use abbe_model::chain::BodyErrors;
+use abbe_model::chain::{BodyErrors, Frame};
 use abbe_model::frames::Point;
 use abbe_model::instrument::Station;
 use abbe_model::session::{Prior, Session};
@@ -83,7 +83,7 @@ fn the_kuka_session_reads_and_its_sockets_nearly_close() {
     let Station::Socket(station) = &session.tests[0].station else {
         panic!("the KUKA session is one of sockets");
     };
-    let off = (0..3).map(|i| (station.ball[i] - ball[i]).powi(2)).sum::<f64>().sqrt();
+    let off = (0..3).map(|i| (station.ball.mm[i] - ball[i]).powi(2)).sum::<f64>().sqrt();
     assert!(off < 1.0, "the session's ball {:?} lies {off:.3} mm from {ball:?}", station.ball);
 }
 
@@ -97,7 +97,7 @@ fn fitted_ball(session: &Session) -> ([f64; 3], f64) {
         let mut state = Vec::new();
         for row in 0..readings.rows() {
             readings.state(&session.machine, row, &mut state);
-            let ball = |point| session.machine.tool_point::<f64>(&state, &none, Point(point)).0;
+            let ball = |point| session.machine.in_r::<f64>(Frame::Tool, &state, &none, Point(point)).0;
             let origin = ball([0.0; 3]);
             let along = [ball([1.0, 0.0, 0.0]), ball([0.0, 1.0, 0.0]), ball([0.0, 0.0, 1.0])];
             for i in 0..3 {

@@ -15,7 +15,7 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::frames::{Point, cross};
 use abbe_model::instrument::InstrumentKind;
-use abbe_model::instrument::rtest::{Orientation, RTest, SENSOR, Setting};
+use abbe_model::instrument::rtest::{Orientation, RTest, SENSOR};
 use abbe_model::session::{placing, readings::Readings};
 use nalgebra::{Matrix3, Vector3};
 
@@ -101,20 +101,15 @@ struct Frames {
 impl Frames {
     fn at(machine: &Machine, rtest: &RTest<f64>, state: &[AxisPosition<f64>], turning: Option<usize>) -> Frames {
         let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
-        let in_r = |point: [f64; 3]| {
-            Vector3::from(match rtest.setting {
-                Setting::Table => machine.workpiece_point(state, &none, Point(point)).0,
-                Setting::Spindle => machine.tool_point(state, &none, Point(point)).0,
-            })
-        };
+        let in_r = |point: [f64; 3]| Vector3::from(machine.in_r(rtest.nest().frame, state, &none, Point(point)).0);
         let origin = in_r([0.0; 3]);
         let columns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|unit| in_r(unit) - origin);
         let turning = turning.and_then(|axis| {
             let at: Vec<f64> = state.iter().map(|position| position.value).collect();
             let (on_axis, along) = placing::axis_line(machine, &at, axis);
-            let ball = machine.workpiece_point(state, &none, Point(rtest.workpiece_ball));
+            let ball = rtest.workpiece_ball.nominal_mm(machine, state);
             let along = Vector3::from(along);
-            let from = Vector3::from(ball.0) - Vector3::from(on_axis);
+            let from = Vector3::from(ball) - Vector3::from(on_axis);
             let outward = from - along * from.dot(&along);
             let radial = (outward.norm() > ON_THE_AXIS_MM).then(|| outward.normalize())?;
             let tangential = Vector3::from(cross(along.into(), Point(radial.into())).0);

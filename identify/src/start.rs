@@ -94,7 +94,7 @@ fn is_unknown(test: &Test, first: usize) -> bool {
 /// Moves a point of the set-up to other coordinates, mm.
 fn set_point(station: &mut Station<f64>, side: usize, to: [f64; 3]) {
     if let Some(point) = &mut station.points_mut()[side] {
-        **point = to;
+        point.mm = to;
     }
 }
 

@@ -12,7 +12,6 @@ use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::component::ErrorName;
 use abbe_model::frames::Rotation;
 use abbe_model::instrument::Station;
-use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -44,8 +43,7 @@ fn machine() -> Machine {
 }
 
 fn station() -> Station<f64> {
-    let workpiece_ball = [0.0, LENGTHS[1], LENGTHS[2] - LENGTHS[3]];
-    BallBar { workpiece_ball, spindle_ball: [0.0; 3], bar: 150.0 }.into()
+    Station::between([0.0, LENGTHS[1], LENGTHS[2] - LENGTHS[3]], [0.0; 3], 150.0)
 }
 
 fn eight(machine: &Machine) -> Vec<usize> {

@@ -41,6 +41,31 @@ pub struct Machine {
     pub bodies: Vec<Body>,
 }
 
+/// The frame of a body. Its coordinates are those of R with all axes at zero and no errors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Frame {
+    /// The bed: R.
+    Bed,
+    /// What the last axis of the workpiece side carries; the bed without such an axis.
+    Table,
+    /// What the last axis of the tool side carries; the bed without such an axis.
+    Tool,
+    /// What an axis carries, by index in [`Machine::axes`].
+    Axis(usize),
+}
+
+impl Frame {
+    /// Its word in files: `table`, `axis A`.
+    pub fn word(self, machine: &Machine) -> String {
+        match self {
+            Frame::Bed => "bed".to_string(),
+            Frame::Table => "table".to_string(),
+            Frame::Tool => "tool".to_string(),
+            Frame::Axis(axis) => format!("axis {}", machine.axes[axis].name),
+        }
+    }
+}
+
 /// Position of an axis; for a rotary axis with its sine and cosine, computed once.
 #[derive(Clone, Copy, Debug)]
 pub struct AxisPosition<N> {
@@ -101,6 +126,29 @@ impl<S: Scalar> BodyErrors<S> {
                 BodyErrors { location: None, squareness: location.map(|six| [six[3], six[4], six[5]]), motion }
             }
         }
+    }
+}
+
+/// A machine at a state of its axes, with errors.
+#[derive(Clone, Copy, Debug)]
+pub struct MachineState<'a, S: Scalar> {
+    /// The machine.
+    pub machine: &'a Machine,
+    /// The positions of its axes.
+    pub state: &'a [AxisPosition<S::Nominal>],
+    /// The errors of its axes.
+    pub errors: &'a [BodyErrors<S>],
+}
+
+impl<S: Scalar> MachineState<'_, S> {
+    /// A point of a frame in R: [`Machine::in_r`].
+    pub fn in_r(&self, frame: Frame, point: Point<S>) -> Point<S> {
+        self.machine.in_r(frame, self.state, self.errors, point)
+    }
+
+    /// A point of R in a frame: [`Machine::in_frame`].
+    pub fn in_frame(&self, frame: Frame, point: Point<S>) -> Point<S> {
+        self.machine.in_frame(frame, self.state, self.errors, point)
     }
 }
 
@@ -241,48 +289,40 @@ impl Machine {
             .collect()
     }
 
-    /// A point of the table frame in R: `P_w`.
-    pub fn workpiece_point<S: Scalar>(
-        &self,
-        state: &[AxisPosition<S::Nominal>],
-        errors: &[BodyErrors<S>],
-        point: Point<S>,
-    ) -> Point<S> {
-        (0..self.workpiece_side).fold(point, |point, index| self.push(index, state, errors, point))
+    /// The axes between a frame and the bed, from the frame on.
+    pub fn carriers(&self, frame: Frame) -> impl DoubleEndedIterator<Item = usize> + Clone {
+        let (count, side) = (self.axes.len(), self.workpiece_side);
+        let (first, carriers) = match frame {
+            Frame::Bed => (0, 0),
+            Frame::Table => (0, side),
+            Frame::Tool => (count.saturating_sub(1), count - side),
+            Frame::Axis(axis) if axis < side => (axis, side - axis),
+            Frame::Axis(axis) => (axis, axis + 1 - side),
+        };
+        (0..carriers).map(move |k| if first < side { first + k } else { first - k })
     }
 
-    /// A point of the tool frame in R: `P_s`.
-    pub fn tool_point<S: Scalar>(
+    /// A point of a frame in R: `P_w` of the table frame, `P_s` of the tool frame.
+    pub fn in_r<S: Scalar>(
         &self,
+        frame: Frame,
         state: &[AxisPosition<S::Nominal>],
         errors: &[BodyErrors<S>],
         point: Point<S>,
     ) -> Point<S> {
-        (self.workpiece_side..self.axes.len()).rev().fold(point, |point, index| self.push(index, state, errors, point))
+        self.carriers(frame).fold(point, |point, index| self.push(index, state, errors, point))
     }
 
-    /// A point of R in the table frame: the inverse of [`Machine::workpiece_point`]. For small-angle errors the inverse
-    /// of `I + [θ]×` is taken as `I − [θ]×`. It is exact to first order and deviates by `θ²` (1e-9 of a length at 6.5″,
-    /// 0.2 µm in 200 mm at 206″).
-    pub fn table_point<S: Scalar>(
+    /// A point of R in a frame: the inverse of [`Machine::in_r`]. For small-angle errors the inverse of `I + [θ]×` is taken
+    /// as `I − [θ]×`. It is exact to first order and deviates by `θ²` (1e-9 of a length at 6.5″, 0.2 µm in 200 mm at 206″).
+    pub fn in_frame<S: Scalar>(
         &self,
+        frame: Frame,
         state: &[AxisPosition<S::Nominal>],
         errors: &[BodyErrors<S>],
         point: Point<S>,
     ) -> Point<S> {
-        (0..self.workpiece_side).rev().fold(point, |point, index| self.pull(index, state, errors, point))
-    }
-
-    /// A point of R in the tool frame: the inverse of [`Machine::tool_point`]; for small-angle errors see
-    /// [`Machine::table_point`].
-    pub fn spindle_point<S: Scalar>(
-        &self,
-        state: &[AxisPosition<S::Nominal>],
-        errors: &[BodyErrors<S>],
-        point: Point<S>,
-    ) -> Point<S> {
-        (self.workpiece_side..self.axes.len())
-            .fold(point, |point, index| pull(&self.axes[index], &state[index], &errors[index], point))
+        self.carriers(frame).rev().fold(point, |point, index| self.pull(index, state, errors, point))
     }
 
     /// Transforms a point from the moved side of axis `index` to its bed side: one step of the chain.
@@ -307,16 +347,20 @@ impl Machine {
         pull(&self.axes[index], &state[index], &errors[index], point)
     }
 
-    /// The moment about axis `index` of a unit weight at `point_mm` of the tool frame (of the table frame for an axis
-    /// on the workpiece side), in mm (newton millimetre per newton): `d · ((p − o) × g)` with the nominal chain.
-    pub fn gravity_moment_mm(&self, index: usize, state: &[AxisPosition<f64>], point_mm: [f64; 3]) -> f64 {
+    /// The moment about axis `index` of a unit weight at a point of a frame, mm, in mm (newton millimetre per newton):
+    /// `d · ((p − o) × g)` with the nominal chain. 0 about an axis that does not carry the frame.
+    pub fn gravity_moment_mm(
+        &self,
+        index: usize,
+        state: &[AxisPosition<f64>],
+        frame: Frame,
+        point_mm: [f64; 3],
+    ) -> f64 {
+        if self.carriers(frame).all(|axis| axis != index) {
+            return 0.0;
+        }
         let none = vec![BodyErrors::<f64>::NONE; self.axes.len()];
-        let load = if index < self.workpiece_side {
-            self.workpiece_point(state, &none, Point(point_mm)).0
-        } else {
-            self.tool_point(state, &none, Point(point_mm)).0
-        };
-        self.moment_about_mm(index, state, load)
+        self.moment_about_mm(index, state, self.in_r(frame, state, &none, Point(point_mm)).0)
     }
 
     /// The moment about axis `index` of a unit weight at the origin of the axis `loaded`, which the axis carries, in mm;
@@ -336,11 +380,7 @@ impl Machine {
 
     /// The moment about an axis of a unit weight at a point of R, in mm.
     fn moment_about_mm(&self, index: usize, state: &[AxisPosition<f64>], load: [f64; 3]) -> f64 {
-        let axis = &self.axes[index];
-        let origin = self.carried_mm(index, state, axis.origin_mm);
-        let tip: [f64; 3] = std::array::from_fn(|i| axis.origin_mm[i] + axis.direction[i]);
-        let tip = self.carried_mm(index, state, tip);
-        let direction: [f64; 3] = std::array::from_fn(|i| tip[i] - origin[i]);
+        let (origin, direction) = self.axis_line(index, state);
         let lever = std::array::from_fn(|i| load[i] - origin[i]);
         let moment = crate::frames::cross(lever, Point(self.gravity)).0;
         let about: f64 = (0..3).map(|i| direction[i] * moment[i]).sum();
@@ -348,15 +388,19 @@ impl Machine {
         if about.abs() < NO_MOMENT_MM { 0.0 } else { about }
     }
 
+    /// A point of an axis and its direction in R, with the nominal chain.
+    pub fn axis_line(&self, index: usize, state: &[AxisPosition<f64>]) -> ([f64; 3], [f64; 3]) {
+        let axis = &self.axes[index];
+        let origin = self.carried_mm(index, state, axis.origin_mm);
+        let tip = self.carried_mm(index, state, std::array::from_fn(|i| axis.origin_mm[i] + axis.direction[i]));
+        (origin, std::array::from_fn(|i| tip[i] - origin[i]))
+    }
+
     /// A point of the line of an axis in R: only the bodies between the axis and the bed carry it.
     fn carried_mm(&self, index: usize, state: &[AxisPosition<f64>], point_mm: [f64; 3]) -> [f64; 3] {
-        let outside: Vec<usize> = if index < self.workpiece_side {
-            (index + 1..self.workpiece_side).collect()
-        } else {
-            (self.workpiece_side..index).rev().collect()
-        };
         let none = BodyErrors::<f64>::NONE;
-        outside.into_iter().fold(Point(point_mm), |point, k| push(&self.axes[k], &state[k], &none, point)).0
+        let carriers = self.carriers(Frame::Axis(index)).skip(1);
+        carriers.fold(Point(point_mm), |point, k| push(&self.axes[k], &state[k], &none, point)).0
     }
 }
 

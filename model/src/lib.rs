@@ -17,8 +17,8 @@
 //! ```
 //! use abbe_model::chain::{AxisPosition, Machine};
 //! use abbe_model::component::ErrorName;
-//! use abbe_model::instrument::Station;
 //! use abbe_model::instrument::ballbar::BallBar;
+//! use abbe_model::instrument::{Station, Target};
 //! use abbe_model::scalar::Scalar;
 //! use num_dual::Dual64;
 //!
@@ -36,7 +36,8 @@
 //!
 //! let machine = Machine::from_code("[wCAbYXZt]")?;
 //! // Ball at R = 100 mm on the table, the other on the axis 75 mm above: L₀ = 125 mm.
-//! let bar = BallBar { workpiece_ball: [0.0, 100.0, 0.0], spindle_ball: [0.0; 3], bar: 125.0 };
+//! let workpiece_ball = Target::on_table([0.0, 100.0, 0.0]);
+//! let bar = BallBar { workpiece_ball, spindle_ball: Target::on_tool([0.0; 3]), bar: 125.0 };
 //! let bar: Station<f64> = bar.into();
 //! let c = 0.7_f64;
 //! assert!((reading(&machine, &bar, c, 0.0_f64) - 125.0).abs() < 1e-12);

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use schemars::JsonSchema;
 
-use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::chain::{AxisPosition, BodyErrors, Frame, Machine};
 use crate::frames::{Point, Rotation, SmallMotion, cross};
 use crate::scalar::{Nominal, Scalar};
 
@@ -29,32 +29,40 @@ pub enum Body {
     Table,
 }
 
+impl Body {
+    /// The frame that turns, and its reference.
+    pub(crate) fn frames(self) -> [Frame; 2] {
+        match self {
+            Body::Relative => [Frame::Tool, Frame::Table],
+            Body::Tool => [Frame::Tool, Frame::Bed],
+            Body::Table => [Frame::Table, Frame::Bed],
+        }
+    }
+}
+
 impl Machine {
-    /// The rotation vector of a frame in R, rad: its rotation in addition to the commanded one. The series ends after the
-    /// third term, so that 20 mrad are exact to 10⁻¹³ rad.
+    /// The rotation vector of a frame against another in R, rad: its rotation in addition to the commanded one. The series
+    /// ends after the third term, so that 20 mrad are exact to 10⁻¹³ rad.
     pub fn rotation_error<S: Scalar>(
         &self,
         state: &[AxisPosition<S::Nominal>],
         errors: &[BodyErrors<S>],
-        body: Body,
+        [frame, against]: [Frame; 2],
     ) -> Point<S> {
-        let of = |is_table: bool| self.turned(state, errors, is_table, None);
-        match body {
-            Body::Relative => self.rotation_vector(of(false), of(true)),
-            Body::Tool => self.rotation_vector(of(false), None),
-            Body::Table => self.rotation_vector(of(true), None),
-        }
+        let turned = |frame| self.turned(state, errors, frame, None);
+        self.rotation_vector(turned(frame), turned(against))
     }
 
-    /// The rotation vector of the tool frame in R, rad, as [`Machine::rotation_error`], with a small rotation of a body in
-    /// the tool frame before the axes, and of the frame that it is read in after them.
+    /// The rotation vector of a frame in R, rad, as [`Machine::rotation_error`], with a small rotation of a body in the
+    /// frame before the axes, and of the frame that it is read in after them.
     pub fn rotation_error_of_body<S: Scalar>(
         &self,
         state: &[AxisPosition<S::Nominal>],
         errors: &[BodyErrors<S>],
-        [in_tool, in_r]: [Option<&SmallMotion<S>>; 2],
+        frame: Frame,
+        [in_frame, in_r]: [Option<&SmallMotion<S>>; 2],
     ) -> Point<S> {
-        let frame = self.turned(state, errors, false, in_tool);
+        let frame = self.turned(state, errors, frame, in_frame);
         let frame = match in_r {
             Some(motion) => {
                 let directions = frame.unwrap_or_else(|| std::array::from_fn(unit));
@@ -85,42 +93,37 @@ impl Machine {
         Point(half.0.map(|x| x * factor))
     }
 
-    /// A direction of the tool frame in R.
-    pub fn tool_direction<S: Scalar>(
+    /// A direction of a frame in R.
+    pub fn direction_in_r<S: Scalar>(
         &self,
+        frame: Frame,
         state: &[AxisPosition<S::Nominal>],
         errors: &[BodyErrors<S>],
         direction: Point<S>,
     ) -> Point<S> {
-        let inwards = (self.workpiece_side..self.axes.len()).rev();
-        inwards.fold(direction, |direction, axis| errors[axis].turn(&self.axes[axis], &state[axis], direction))
+        let turn = |direction, axis: usize| errors[axis].turn(&self.axes[axis], &state[axis], direction);
+        self.carriers(frame).fold(direction, turn)
     }
 
-    /// The directions of R as a frame carries them from its commanded to its actual orientation; `None` for a side
-    /// without errors. A small rotation turns them in the frame.
+    /// The directions of R as a frame carries them from its commanded to its actual orientation; `None` without
+    /// errors. A small rotation turns them in the frame.
     fn turned<S: Scalar>(
         &self,
         state: &[AxisPosition<S::Nominal>],
         errors: &[BodyErrors<S>],
-        of_table: bool,
+        frame: Frame,
         in_frame: Option<&SmallMotion<S>>,
     ) -> Option<[Point<S>; 3]> {
-        let side = if of_table { 0..self.workpiece_side } else { self.workpiece_side..self.axes.len() };
-        let turns = errors.get(side.clone()).is_some_and(|errors| !errors.iter().all(BodyErrors::turns_nothing));
+        let turns = self.carriers(frame).any(|axis| !errors[axis].turns_nothing());
         if !turns && in_frame.is_none() {
             return None;
         }
         // Outwards from the bed on the way back, inwards on the way to it.
-        let outwards: Vec<usize> = if of_table { side.rev().collect() } else { side.collect() };
+        let back = |direction, axis: usize| BodyErrors::turn_back(&self.axes[axis], &state[axis], direction);
         Some(std::array::from_fn(|i| {
-            let commanded = outwards
-                .iter()
-                .fold(unit(i), |direction, axis| BodyErrors::turn_back(&self.axes[*axis], &state[*axis], direction));
+            let commanded = self.carriers(frame).rev().fold(unit(i), back);
             let commanded = in_frame.map_or(commanded, |motion| motion.rotate(commanded));
-            outwards
-                .iter()
-                .rev()
-                .fold(commanded, |direction, axis| errors[*axis].turn(&self.axes[*axis], &state[*axis], direction))
+            self.direction_in_r(frame, state, errors, commanded)
         }))
     }
 }
@@ -177,7 +180,7 @@ mod tests {
         let (tool, table) = (from_commanded(&[2, 3, 4]), from_commanded(&[1, 0]));
         for (body, turned) in [(Body::Tool, tool), (Body::Table, table), (Body::Relative, tool * table.transpose())] {
             let expected = Rotation3::from_matrix_unchecked(turned).scaled_axis();
-            let found = Vector3::from(machine.rotation_error::<f64>(&state, &errors, body).0);
+            let found = Vector3::from(machine.rotation_error::<f64>(&state, &errors, body.frames()).0);
             assert!((found - expected).norm() < 1e-12, "{body:?}: {found} instead of {expected}");
         }
     }

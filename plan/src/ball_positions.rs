@@ -1,6 +1,6 @@
 //! Positions of the carried ball in candidate tests, and positions of the rotary axes that do not sweep.
 
-use abbe_model::instrument::InstrumentKind;
+use abbe_model::instrument::{InstrumentKind, Target};
 use abbe_model::session::Session;
 
 use super::variations::TestVariations;
@@ -10,8 +10,8 @@ const SAME_POSITION_MM: f64 = 0.5;
 
 /// A position of the carried ball, with its set-up.
 pub(super) struct BallPosition {
-    /// Centre, mm.
-    pub ball: [f64; 3],
+    /// Centre.
+    pub ball: Target<f64>,
     /// The set-up of this position in the session. Empty for a new mount.
     pub setup: String,
     /// Whether the ball has to be mounted for it.
@@ -30,7 +30,7 @@ pub(super) fn ball_positions(
     let machine = &session.machine;
     let mut positions: Vec<BallPosition> = Vec::new();
     for test in session.tests.iter().filter(|test| on_table && test.station.kind() == kind) {
-        let Some(ball) = test.station.table_point_mm() else { continue };
+        let Some(ball) = test.station.table_point() else { continue };
         if !positions.iter().any(|position| position.setup == test.setup) {
             positions.push(BallPosition { ball, setup: test.setup.clone(), new: false });
         }
@@ -42,11 +42,12 @@ pub(super) fn ball_positions(
             for &height in &variations.heights_mm {
                 for sign in sides(on_table, about, height) {
                     let up = if axis.direction[2] < 0.0 { -1.0 } else { 1.0 };
-                    let ball: [f64; 3] = std::array::from_fn(|i| {
+                    let mm: [f64; 3] = std::array::from_fn(|i| {
                         axis.origin_mm[i] + up * sign * height * axis.direction[i] + radius * across[i]
                     });
-                    let present = positions.iter().any(|position| distance(position.ball, ball) < SAME_POSITION_MM);
+                    let present = positions.iter().any(|position| distance(position.ball.mm, mm) < SAME_POSITION_MM);
                     if !present {
+                        let ball = if on_table { Target::on_table(mm) } else { Target::on_tool(mm) };
                         positions.push(BallPosition { ball, setup: String::new(), new: true });
                     }
                 }
@@ -150,7 +151,7 @@ mod tests {
             let found = ball_positions(&session, session.instrument, &variations, &[about], true);
             let along_and_off = found.iter().map(|position| {
                 assert!(position.new && position.setup.is_empty());
-                let from: [f64; 3] = std::array::from_fn(|i| position.ball[i] - axis.origin_mm[i]);
+                let from: [f64; 3] = std::array::from_fn(|i| position.ball.mm[i] - axis.origin_mm[i]);
                 let along: f64 = (0..3).map(|i| from[i] * axis.direction[i]).sum();
                 [along, (from.iter().map(|x| x * x).sum::<f64>() - along * along).sqrt()]
             });

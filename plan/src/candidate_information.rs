@@ -116,7 +116,7 @@ fn ready(
             && last.spindle_setup != candidate.test.spindle_setup
             // Optics and sensors of angles are aligned anew.
             && !matches!(last.station.contact(), Contact::None)
-            && last.station.tool_point_mm() == candidate.test.station.tool_point_mm()
+            && last.station.tool_point() == candidate.test.station.tool_point()
     });
     if let Some(last) = last {
         let is_of_tool = |thing: &str| shared_by(alone.tests.iter(), thing) == Some(SharedBy::SpindleSetup);

@@ -84,7 +84,9 @@ pub(super) fn drafts(session: &Session, variations: &TestVariations, last: &Test
             })
             .collect();
         let on_table = axis < machine.workpiece_side;
-        for ball in ball_positions(session, last.station.kind(), variations, &rotary, on_table) {
+        let turns = |ball: &BallPosition| machine.carriers(ball.ball.frame).any(|carrier| carrier == axis);
+        let balls = ball_positions(session, last.station.kind(), variations, &rotary, on_table);
+        for ball in balls.into_iter().filter(turns) {
             for at in axis_positions(session, variations, &rotary, axis) {
                 let feeds = variations.feeds.iter();
                 for (&(share, sweep), &feed) in
@@ -135,8 +137,7 @@ impl Choice<'_> {
     }
 
     fn station(&self, nominal: f64) -> BallBar<f64> {
-        let none = || BallBar { workpiece_ball: [0.0; 3], spindle_ball: [0.0; 3], bar: 0.0 };
-        let mut bar = self.last.station.bar().cloned().unwrap_or_else(none);
+        let mut bar = self.last.station.bar().cloned().unwrap_or(BallBar::ORIGINS);
         bar.bar = self.length(nominal);
         if self.on_table {
             bar.workpiece_ball = self.ball.ball;

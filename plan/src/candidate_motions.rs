@@ -18,10 +18,9 @@ use std::f64::consts::{PI, TAU};
 use abbe_identify::start;
 use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
-use abbe_model::chain::{BodyErrors, Machine};
-use abbe_model::frames::Point;
+use abbe_model::chain::Machine;
 use abbe_model::instrument::ballbar::BallBar;
-use abbe_model::instrument::{Following, InstrumentKind, Station, Travel};
+use abbe_model::instrument::{Following, InstrumentKind, Station, Target, Travel};
 use abbe_model::session::expression::Length;
 use abbe_model::session::motion::{Course, FollowOffset, Motion, Moved, Traversals};
 use abbe_model::session::{Prior, Session, Test, placing};
@@ -255,12 +254,10 @@ impl Template<'_> {
     /// The positions at which the tool's point is beside a point of the table. `approach` is in the table frame.
     fn touching(&self, point: &BallPosition, approach: [f64; 3], at: &[f64]) -> Option<Vec<f64>> {
         let machine = self.machine();
-        let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
         let state = machine.axis_positions(at);
-        let in_r = |mm: [f64; 3]| machine.workpiece_point::<f64>(&state, &none, Point(mm)).0;
-        let beside: [f64; 3] = std::array::from_fn(|i| point.ball[i] + approach[i]);
-        let (from, to) = (in_r(point.ball), in_r(beside));
-        let bar = BallBar { workpiece_ball: point.ball, spindle_ball: self.station.tool_point_mm(), bar: 0.0 };
+        let beside = Target { mm: std::array::from_fn(|i| point.ball.mm[i] + approach[i]), ..point.ball };
+        let (from, to) = (point.ball.nominal_mm(machine, &state), beside.nominal_mm(machine, &state));
+        let bar = BallBar { workpiece_ball: point.ball, spindle_ball: self.station.tool_point(), bar: 0.0 };
         placing::positions_for_bar(machine, &bar, at, std::array::from_fn(|i| to[i] - from[i]))
     }
 
@@ -322,7 +319,7 @@ impl Template<'_> {
         if !point.new {
             return format!(" as in {}", point.setup);
         }
-        let [x, y, z] = point.ball.map(|mm| number((mm * 10.0).round() / 10.0));
+        let [x, y, z] = point.ball.mm.map(|mm| number((mm * 10.0).round() / 10.0));
         format!(" at ({x}, {y}, {z}) mm of the table")
     }
 

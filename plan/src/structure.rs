@@ -125,7 +125,7 @@ fn random_geometry(session: &Session, tests: &[Test], draw: u64) -> Session {
         let add = |point: &mut [f64; 3], by: [f64; 3]| point.iter_mut().zip(by).for_each(|(x, by)| *x += by);
         for (point, by) in test.station.points_mut().into_iter().zip([at_workpiece, at_tool]) {
             if let Some(point) = point {
-                add(point, by);
+                add(&mut point.mm, by);
             }
         }
         let Some(readings) = &mut test.readings else { continue };

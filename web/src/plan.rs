@@ -11,7 +11,7 @@ use abbe::files::template;
 use abbe::identify::problem::Problem;
 use abbe::identify::series::paths;
 use abbe::model::axis::AxisKind;
-use abbe::model::chain::{AxisPosition, BodyErrors, Machine};
+use abbe::model::chain::{AxisPosition, BodyErrors, Frame, Machine};
 use abbe::model::document::schema;
 use abbe::model::frames::Point;
 use abbe::model::session::Test;
@@ -79,8 +79,8 @@ impl Plan {
                 "name": test.name,
                 "instrument": test.station.kind().word(),
                 "bar_mm": bar_mm,
-                "table_point_mm": test.station.table_point_mm(),
-                "tool_point_mm": test.station.tool_point_mm(),
+                "table_point_mm": test.station.table_point().map(|point| point.mm),
+                "tool_point_mm": test.station.tool_point().mm,
                 "moves": moves,
                 "coordinates": channels,
                 "readings": readings,
@@ -211,18 +211,15 @@ fn stops(machine: &Machine, test: &Test, rows: &[usize]) -> Vec<Value> {
         readings.state(machine, *row, &mut state);
         let positions = machine.axes.iter().zip(&readings.positions);
         let at: Vec<f64> = positions.map(|(axis, column)| axis.kind.to_display(column[*row])).collect();
-        json!({ "at": at, "table": turned(machine, &state, true), "tool": turned(machine, &state, false) })
+        json!({ "at": at, "table": turned(machine, &state, Frame::Table), "tool": turned(machine, &state, Frame::Tool) })
     };
     rows.iter().map(stop).collect()
 }
 
-/// The images of the unit vectors of the table frame or the tool frame in R.
-fn turned(machine: &Machine, state: &[AxisPosition<f64>], table: bool) -> [[f64; 3]; 3] {
+/// The images of the unit vectors of a frame in R.
+fn turned(machine: &Machine, state: &[AxisPosition<f64>], frame: Frame) -> [[f64; 3]; 3] {
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
-    let image = |point: [f64; 3]| {
-        let point = Point(point);
-        if table { machine.workpiece_point(state, &none, point).0 } else { machine.tool_point(state, &none, point).0 }
-    };
+    let image = |point: [f64; 3]| machine.in_r(frame, state, &none, Point(point)).0;
     let origin = image([0.0; 3]);
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|unit| {
         let end = image(unit);

@@ -8,7 +8,7 @@
 
 use abbe_model::Diagnostic;
 use abbe_model::axis::{Axis, AxisKind};
-use abbe_model::chain::{AxisPosition, ERRORS_PER_AXIS, Machine};
+use abbe_model::chain::{AxisPosition, ERRORS_PER_AXIS, Frame, Machine};
 use abbe_model::driver::Driver;
 use abbe_model::frames::Point;
 use abbe_model::session::readings::Readings;
@@ -196,8 +196,8 @@ fn of_model(
 /// The derivative of the tool point in the table frame by an error of the machine without errors.
 pub(crate) fn point_by(machine: &Machine, state: &[AxisPosition<f64>], tool_mm: [f64; 3], slot: usize) -> Vector3<f64> {
     let errors = machine.body_errors(|own| own == slot, |own| Dual64::new(0.0, f64::from(u8::from(own == slot))));
-    let reference = machine.tool_point(state, &errors, Point::nominal(tool_mm));
-    let point = machine.table_point(state, &errors, reference);
+    let reference = machine.in_r(Frame::Tool, state, &errors, Point::nominal(tool_mm));
+    let point = machine.in_frame(Frame::Table, state, &errors, reference);
     let of_linear_position =
         machine.axes[slot / ERRORS_PER_AXIS].kind == AxisKind::Linear && slot % ERRORS_PER_AXIS < 3;
     if of_linear_position { Vector3::zeros() } else { Vector3::from(point.0.map(|coordinate| coordinate.eps)) }

@@ -14,7 +14,7 @@
 //! there what the travel does not determine.
 
 use abbe_model::Diagnostic;
-use abbe_model::chain::ERRORS_PER_AXIS;
+use abbe_model::chain::{ERRORS_PER_AXIS, Frame};
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::driver::Driver;
 use abbe_model::effect::Effect;
@@ -174,7 +174,9 @@ impl<'m> Lines<'m> {
             if let Some(coordinate) = tool.get_mut(offset) {
                 *coordinate += 1.0;
             }
-            Vector3::from(machine.table_point(&state, &none, machine.tool_point(&state, &none, Point(tool))).0)
+            Vector3::from(
+                machine.in_frame(Frame::Table, &state, &none, machine.in_r(Frame::Tool, &state, &none, Point(tool))).0,
+            )
         };
         const NO_OFFSET: usize = 3;
         let places = parallel::map(self.grid.rows(), &|row| point(row, NO_OFFSET));
@@ -238,8 +240,8 @@ impl<'m> Lines<'m> {
             let mut state = Vec::new();
             self.grid.state(machine, row, &mut state);
             let point = |bodies: &[_]| {
-                let tool = machine.tool_point(&state, bodies, Point(self.tool_mm));
-                Vector3::from(machine.table_point(&state, bodies, tool).0)
+                let tool = machine.in_r(Frame::Tool, &state, bodies, Point(self.tool_mm));
+                Vector3::from(machine.in_frame(Frame::Table, &state, bodies, tool).0)
             };
             point(&bodies) - point(&none)
         });

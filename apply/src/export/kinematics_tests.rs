@@ -1,7 +1,7 @@
 //! Tables of controls, by kinematics of the controls and rigid bodies that know nothing of their writer.
 
 use abbe_model::Diagnostic;
-use abbe_model::chain::{AxisPosition, Machine};
+use abbe_model::chain::{AxisPosition, Frame, Machine};
 use abbe_model::frames::Point;
 use nalgebra::{Rotation3, Vector3};
 use rand::SeedableRng;
@@ -53,8 +53,8 @@ fn tables_of_controls_give_the_tool_positions_of_the_model() {
         let q = [c, a, joints[1], joints[0], joints[2]];
         let state: Vec<AxisPosition<f64>> =
             machine.axes.iter().zip(q).map(|(axis, q)| AxisPosition::new(axis.kind, q)).collect();
-        let tool = machine.tool_point(&state, &bodies, Point([0.0; 3]));
-        Vector3::from(machine.table_point(&state, &bodies, tool).0)
+        let tool = machine.in_r(Frame::Tool, &state, &bodies, Point([0.0; 3]));
+        Vector3::from(machine.in_frame(Frame::Table, &state, &bodies, tool).0)
     };
     let of_linuxcnc = entries_of(&model, "linuxcnc", EntryChoice::Best).unwrap();
     let rot_point = ["x-rot-point", "y-rot-point", "z-rot-point"].map(|field| change(&of_linuxcnc, field));

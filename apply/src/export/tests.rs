@@ -5,7 +5,7 @@ use abbe_identify::model_file::document::{Role, SCHEMA, SCHEMA_VERSION};
 use abbe_identify::model_file::{IdentifiedModel, ModelParameter, Provenance};
 use abbe_identify::noise::{Noise, NoiseSource};
 use abbe_identify::results::ModelFit;
-use abbe_model::chain::{AxisPosition, Machine};
+use abbe_model::chain::{AxisPosition, Frame, Machine};
 use abbe_model::document::kind::Kind;
 use abbe_model::frames::Point;
 use abbe_model::unit::Unit;
@@ -83,7 +83,7 @@ fn of_chain(model: &IdentifiedModel, q: &[f64], tool_mm: [f64; 3]) -> Vector3<f6
     let errors = machine.body_errors(|slot| slots[slot] != 0.0, |slot| slots[slot]);
     let state: Vec<AxisPosition<f64>> =
         machine.axes.iter().zip(q).map(|(axis, q)| AxisPosition::new(axis.kind, *q)).collect();
-    Vector3::from(machine.tool_point(&state, &errors, Point(tool_mm)).0)
+    Vector3::from(machine.in_r(Frame::Tool, &state, &errors, Point(tool_mm)).0)
 }
 
 fn translation(x: f64, y: f64, z: f64) -> Matrix4<f64> {

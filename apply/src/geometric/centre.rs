@@ -15,8 +15,7 @@
 //! Jiang (2014): full reference in [`super`].
 
 use abbe_model::axis::AxisKind;
-use abbe_model::chain::{BodyErrors, Machine};
-use abbe_model::frames::Point;
+use abbe_model::chain::Machine;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::sensitivity::TestModel;
 use num_dual::{Derivative, DualNum, DualSVec64};
@@ -65,7 +64,7 @@ impl CircleGeometry {
         let axis = turning(machine, model)?;
         let on_table = axis < machine.workpiece_side;
         let balls = |row| balls(machine, model, bar, row, on_table);
-        let (origin, along) = line(machine, model, axis);
+        let (origin, along) = machine.axis_line(axis, &model.state(0));
         let Some(principal) = (0..3).find(|k| (along[*k].abs() - 1.0).abs() < MOTION_TOLERANCE) else {
             return Err(format!("axis `{}` does not lie along X, Y or Z while it turns", machine.axes[axis].name));
         };
@@ -168,26 +167,6 @@ fn turning(machine: &Machine, model: &TestModel) -> Result<usize, String> {
 
 /// Nominal positions of the moving ball and the fixed one in R.
 fn balls(machine: &Machine, model: &TestModel, bar: &BallBar<f64>, row: usize, on_table: bool) -> ([f64; 3], [f64; 3]) {
-    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
-    let (workpiece, spindle) = bar.balls::<f64>(machine, &model.state(row), &none, &|_| None);
-    if on_table { (workpiece.0, spindle.0) } else { (spindle.0, workpiece.0) }
-}
-
-/// A point of an axis and its direction in R, at the positions of the first reading.
-fn line(machine: &Machine, model: &TestModel, axis: usize) -> ([f64; 3], [f64; 3]) {
-    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
-    let state = &model.state(0);
-    let in_r = |point: [f64; 3]| {
-        let outward: Vec<usize> = if axis < machine.workpiece_side {
-            (axis + 1..machine.workpiece_side).collect()
-        } else {
-            (machine.workpiece_side..axis).rev().collect()
-        };
-        let carried = |point, index: usize| machine.push::<f64>(index, state, &none, point);
-        outward.into_iter().fold(Point(point), carried).0
-    };
-    let axis = &machine.axes[axis];
-    let origin = in_r(axis.origin_mm);
-    let tip = in_r(std::array::from_fn(|k| axis.origin_mm[k] + axis.direction[k]));
-    (origin, std::array::from_fn(|k| tip[k] - origin[k]))
+    let [workpiece, spindle] = bar.nominal_mm(machine, &model.state(row));
+    if on_table { (workpiece, spindle) } else { (spindle, workpiece) }
 }

@@ -12,7 +12,7 @@ mod results;
 
 use abbe_identify::error;
 use abbe_model::Diagnostic;
-use abbe_model::chain::{BodyErrors, ERRORS_PER_AXIS, Machine};
+use abbe_model::chain::{BodyErrors, ERRORS_PER_AXIS, Frame, Machine};
 use abbe_model::frames::Point;
 use abbe_model::sensitivity::SlotValues;
 use abbe_model::session::limits::LARGEST;
@@ -80,8 +80,8 @@ impl MachineWithErrors<'_> {
         } else {
             vec![BodyErrors::NONE; machine.axes.len()]
         };
-        let tool = machine.tool_point(&state, &errors, Point(self.tool_mm));
-        Vector3::from(machine.table_point(&state, &errors, tool).0)
+        let tool = machine.in_r(Frame::Tool, &state, &errors, Point(self.tool_mm));
+        Vector3::from(machine.in_frame(Frame::Table, &state, &errors, tool).0)
     }
 
     /// The error vector at given axis positions.

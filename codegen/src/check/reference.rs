@@ -1,6 +1,7 @@
 //! Reference value and derivatives of a form, from the chain over dual numbers.
 
 use abbe_model::Diagnostic;
+use abbe_model::chain::MachineState;
 use num_dual::{Derivative, Dual64, DualNum, DualSVec64, HyperDual64};
 
 use crate::check::points::CheckPoint;
@@ -32,7 +33,8 @@ where
     let groups = match (run.subject.bar(), run.probe_geometry()) {
         (Some(bar), _) => {
             let unknown = |slot: usize| run.unknown(slot);
-            let (p, q) = bar.balls(&equation.machine, &run.state, &run.errors, &unknown);
+            let at = MachineState { machine: &equation.machine, state: &run.state, errors: &run.errors };
+            let (p, q) = bar.balls(at, &unknown);
             p.minus(q).0.to_vec()
         }
         (None, Some(geometry)) => [geometry.stylus.0, geometry.step.0].concat(),

@@ -6,8 +6,7 @@ use std::f64::consts::{PI, TAU};
 
 use abbe_model::Diagnostic;
 use abbe_model::axis::{Axis, AxisKind};
-use abbe_model::chain::{BodyErrors, Machine};
-use abbe_model::frames::Point;
+use abbe_model::chain::{BodyErrors, Frame, Machine};
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::session::Test;
 use abbe_model::session::motion::{Course, Motion, Moved, Traversals, length_of};
@@ -395,11 +394,10 @@ fn plane(machine: &Machine, axes: [usize; 2]) -> Option<(Plane, [usize; 2])> {
 
 /// The largest deviation of the distance of the balls at the middle of a segment from that at its ends, mm.
 fn chord_error_mm(machine: &Machine, test: &Test, vertices: &[Vec<f64>]) -> f64 {
-    let bar = BallBar {
-        workpiece_ball: test.station.table_point_mm().unwrap_or_default(),
-        spindle_ball: test.station.tool_point_mm(),
-        bar: 0.0,
-    };
+    let bar = test
+        .station
+        .between_points()
+        .unwrap_or(BallBar { spindle_ball: test.station.tool_point(), ..BallBar::ORIGINS });
     let distance = |at: &[f64]| {
         let (workpiece, spindle) = balls(machine, &bar, at);
         (0..3).map(|i| (spindle[i] - workpiece[i]).powi(2)).sum::<f64>().sqrt()
@@ -415,6 +413,6 @@ fn chord_error_mm(machine: &Machine, test: &Test, vertices: &[Vec<f64>]) -> f64 
 fn tool_over_table(machine: &Machine, test: &Test, state: &[f64]) -> [f64; 3] {
     let states = machine.axis_positions(state);
     let none = vec![BodyErrors::<f64>::NONE; state.len()];
-    let tool = machine.tool_point::<f64>(&states, &none, Point(test.station.tool_point_mm()));
-    machine.table_point::<f64>(&states, &none, tool).0
+    let tool = test.station.tool_point().nominal_in_r(machine, &states);
+    machine.in_frame::<f64>(Frame::Table, &states, &none, tool).0
 }

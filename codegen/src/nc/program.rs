@@ -2,7 +2,7 @@
 
 use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
-use abbe_model::chain::{BodyErrors, Machine};
+use abbe_model::chain::{BodyErrors, Frame, Machine};
 use abbe_model::frames::Point;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::session::moves::{Mounted, Moves};
@@ -168,11 +168,8 @@ impl Writer<'_> {
     /// The balls of the instrument: where a bar, or a sensor and a ball, stand. Without a target on the table, the tool moves
     /// against its origin.
     fn bar(&self) -> BallBar<f64> {
-        BallBar {
-            workpiece_ball: self.test.station.table_point_mm().unwrap_or_default(),
-            spindle_ball: self.test.station.tool_point_mm(),
-            bar: self.test.station.reference_mm(),
-        }
+        let tool_alone = || BallBar { spindle_ball: self.test.station.tool_point(), ..BallBar::ORIGINS };
+        self.test.station.between_points().unwrap_or_else(tool_alone)
     }
 
     /// The positions with the tool retracted along itself; `None` if the linear axes or their travel do not allow it.
@@ -180,7 +177,7 @@ impl Writer<'_> {
         let bar = self.bar();
         let states = self.machine.axis_positions(at);
         let none = vec![BodyErrors::<f64>::NONE; at.len()];
-        let point = |z: f64| self.machine.tool_point::<f64>(&states, &none, Point([0.0, 0.0, z])).0;
+        let point = |z: f64| self.machine.in_r::<f64>(Frame::Tool, &states, &none, Point([0.0, 0.0, z])).0;
         let (near, far) = (point(0.0), point(self.options.clearance_mm));
         let (workpiece, spindle) = balls(self.machine, &bar, at);
         let requested = std::array::from_fn(|i| spindle[i] - workpiece[i] + far[i] - near[i]);
@@ -252,8 +249,10 @@ impl Writer<'_> {
             let blocks = &mut draft.blocks;
             blocks.push(Block::Comment(format!("Centring of the workpiece ball, setup {}", name(&self.test.setup))));
             self.line(self.all(&above, AxisKind::Linear), blocks);
-            blocks
-                .push(Block::Stop("Mount the spindle cup, and the workpiece ball with its base loose below it".into()));
+            let on = self.bar().workpiece_ball.mounted(self.machine);
+            blocks.push(Block::Stop(format!(
+                "Mount the spindle cup, and the workpiece ball{on} with its base loose below it"
+            )));
             self.line(self.moved(&above, &centre, AxisKind::Linear), blocks);
             blocks.push(Block::Stop("Let the cup take the workpiece ball. Lock its base".into()));
             self.line(self.moved(&centre, &above, AxisKind::Linear), blocks);

@@ -4,7 +4,7 @@ use abbe_codegen::evaluate::evaluate_f64;
 use abbe_codegen::{Equation, Options, Variable};
 use abbe_model::chain::AxisPosition;
 use abbe_model::frames::Rotation;
-use abbe_model::instrument::{Station, ballbar::BallBar};
+use abbe_model::instrument::{Station, Target, ballbar::BallBar};
 use rand::RngExt;
 use rand::SeedableRng;
 
@@ -24,7 +24,8 @@ fn the_symbolic_chain_evaluates_to_the_chain_over_numbers() {
             let (a, c) = (draw(7.0), draw(7.0));
             let values: Vec<f64> =
                 errors.iter().map(|e| if e.freedom.is_angle() { draw(0.1) } else { draw(10.0) }).collect();
-            let bar = BallBar { workpiece_ball: [0.0, r, h - z_ca], spindle_ball: [-d, 0.0, 0.0], bar: r };
+            let spindle_ball = Target::on_tool([-d, 0.0, 0.0]);
+            let bar = BallBar { workpiece_ball: Target::on_table([0.0, r, h - z_ca]), spindle_ball, bar: r };
             let state: Vec<_> = machine
                 .axes
                 .iter()

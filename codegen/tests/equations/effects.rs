@@ -12,7 +12,7 @@ use abbe_model::effect::shape::{
     Cosine, Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Spectrum, Steps, Triangle, Warmup,
 };
 use abbe_model::effect::{Component, Effect, Shape};
-use abbe_model::instrument::{Station, ballbar::BallBar, socket::Socket};
+use abbe_model::instrument::{Station, Target, ballbar::BallBar, socket::Socket};
 use abbe_model::scalar::Nominal;
 
 use crate::support::printed;
@@ -24,7 +24,7 @@ struct Ball;
 impl Source for Ball {
     fn subject<N: Nominal>(&self, _length: &impl Fn(&str) -> N) -> Subject<N> {
         Subject::Station(Station::Socket(Socket {
-            ball: [N::constant(0.0); 3],
+            ball: Target::on_tool([N::constant(0.0); 3]),
             socket: [N::constant(0.0); 3],
             is_located: true,
         }))
@@ -223,8 +223,8 @@ impl Source for Bar {
     fn subject<N: Nominal>(&self, length: &impl Fn(&str) -> N) -> Subject<N> {
         let zero = N::constant(0.0);
         Subject::Station(Station::BallBar(BallBar {
-            workpiece_ball: [zero, length("R"), N::constant(20.0)],
-            spindle_ball: [zero; 3],
+            workpiece_ball: Target::on_table([zero, length("R"), N::constant(20.0)]),
+            spindle_ball: Target::on_tool([zero; 3]),
             bar: length("R"),
         }))
     }

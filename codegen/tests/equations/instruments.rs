@@ -9,13 +9,13 @@ use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::component::ErrorName;
 use abbe_model::instrument::angle::Angle;
 use abbe_model::instrument::column::Quantity;
-use abbe_model::instrument::distance::{Distance, StationFrame};
+use abbe_model::instrument::distance::Distance;
 use abbe_model::instrument::laser::Laser;
 use abbe_model::instrument::pointing::Pointing;
 use abbe_model::instrument::pose::Pose;
 use abbe_model::instrument::stand::Stand;
 use abbe_model::instrument::tracker::Tracker;
-use abbe_model::instrument::{Geometry, Station};
+use abbe_model::instrument::{Geometry, Station, Target};
 use abbe_model::rotation_error::Body;
 use abbe_model::scalar::Nominal;
 use num_dual::Dual64;
@@ -40,15 +40,15 @@ const ALL: [Any; 6] = [Any::Laser, Any::Angle, Any::Distance, Any::Pointing, Any
 
 impl Source for Any {
     fn subject<N: Nominal>(&self, length: &impl Fn(&str) -> N) -> Subject<N> {
-        let point = |names: [&str; 3]| names.map(length);
-        let (table, tool) = (["W_x", "W_y", "W_z"], ["S_x", "S_y", "S_z"]);
+        let table = Target::on_table(["W_x", "W_y", "W_z"].map(length));
+        let tool = Target::on_tool(["S_x", "S_y", "S_z"].map(length));
         let directions = [[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]].map(|row| row.map(N::constant));
         let stand = || Stand { rotation: directions, origin: [250.0, -4000.0, 900.0].map(N::constant) };
         Subject::Station(match self {
             Any::Laser => {
                 let mut laser = Laser {
-                    reflector: point(tool),
-                    optic: point(table),
+                    reflector: tool,
+                    optic: table,
                     frame: directions,
                     channels: Vec::new(),
                     is_beam_stated: false,
@@ -58,12 +58,10 @@ impl Source for Any {
                 laser.into()
             }
             Any::Angle => Angle { about: directions[..2].to_vec(), body: Body::Relative }.into(),
-            Any::Distance => {
-                Distance { station: point(table), reflector: point(tool), frame: StationFrame::Table }.into()
-            }
+            Any::Distance => Distance { station: table, reflector: tool }.into(),
             Any::Pointing => Pointing { directions, is_free: true }.into(),
-            Any::Polar => Tracker { target: point(tool), stand: stand(), is_polar: true }.into(),
-            Any::Pose => Pose { target: point(tool), stand: stand(), turn: None }.into(),
+            Any::Polar => Tracker { target: tool, stand: stand(), is_polar: true }.into(),
+            Any::Pose => Pose { target: tool, stand: stand(), turn: None }.into(),
         })
     }
 }

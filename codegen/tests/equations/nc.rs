@@ -19,11 +19,7 @@ use nalgebra::DVector;
 use crate::tools::folder;
 
 fn bar_of(test: &Test) -> BallBar<f64> {
-    BallBar {
-        workpiece_ball: test.station.table_point_mm().unwrap(),
-        spindle_ball: test.station.tool_point_mm(),
-        bar: test.station.reference_mm(),
-    }
+    test.station.between_points().unwrap()
 }
 
 fn at(machine: &Machine, positions: &Positions) -> Vec<f64> {

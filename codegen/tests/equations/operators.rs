@@ -2,7 +2,7 @@
 //! the printed code.
 
 use abbe_codegen::{Source, Subject};
-use abbe_model::instrument::{Station, socket::Socket};
+use abbe_model::instrument::{Station, Target, socket::Socket};
 use abbe_model::scalar::Nominal;
 
 /// Operands: sums, differences, products, quotients, negations, functions.
@@ -72,7 +72,7 @@ impl Batch {
 impl Source for Batch {
     fn subject<N: Nominal>(&self, length: &impl Fn(&str) -> N) -> Subject<N> {
         Subject::Station(Station::Socket(Socket {
-            ball: self.coordinates(["P", "Q", "U", "V"].map(length)),
+            ball: Target::on_tool(self.coordinates(["P", "Q", "U", "V"].map(length))),
             socket: [N::constant(0.0); 3],
             is_located: true,
         }))

@@ -7,7 +7,7 @@ use abbe_codegen::{Equation, Options, Order, Source, Subject, Variable, check};
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName};
-use abbe_model::instrument::{Station, probe::Probe};
+use abbe_model::instrument::{Station, Target, probe::Probe};
 use abbe_model::scalar::Nominal;
 use nalgebra::{Matrix4, Rotation3, Vector3, Vector4};
 use rand::{RngExt, SeedableRng};
@@ -49,10 +49,10 @@ impl Touch {
 impl Source for Touch {
     fn subject<N: Nominal>(&self, length: &impl Fn(&str) -> N) -> Subject<N> {
         Subject::Station(Station::Probe(Probe {
-            artefact: ["A_x", "A_y", "A_z"].map(length),
+            artefact: Target::on_table(["A_x", "A_y", "A_z"].map(length)),
             axis: self.axis().map(N::constant),
             radius: length("R"),
-            stylus: ["S_x", "S_y", "S_z"].map(length),
+            stylus: Target::on_tool(["S_x", "S_y", "S_z"].map(length)),
             direction: self.stated.then(|| STATED.map(N::constant)),
         }))
     }

@@ -5,7 +5,7 @@ use abbe_codegen::{Equation, Options, Source, Subject, Variable, VariableValue};
 use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::component::ErrorName;
 use abbe_model::frames::Rotation;
-use abbe_model::instrument::{Station, socket::Socket, stand::Stand, tracker::Tracker};
+use abbe_model::instrument::{Station, Target, socket::Socket, stand::Stand, tracker::Tracker};
 use abbe_model::scalar::Nominal;
 use num_dual::{Derivative, DualSVec64};
 use rand::{RngExt, SeedableRng};
@@ -21,7 +21,7 @@ struct AnyTracker;
 impl Source for AnyTracker {
     fn subject<N: Nominal>(&self, length: &impl Fn(&str) -> N) -> Subject<N> {
         Subject::Station(Station::Tracker(Tracker {
-            target: [length("S_x"), length("S_y"), length("S_z")],
+            target: Target::on_tool([length("S_x"), length("S_y"), length("S_z")]),
             stand: Stand {
                 rotation: [[0.6, 0.8, 0.0], [0.0, 0.0, 1.0], [0.8, -0.6, 0.0]].map(|row| row.map(N::constant)),
                 origin: [250.0, -40.0, 900.0].map(N::constant),
@@ -37,7 +37,7 @@ struct AnySocket;
 impl Source for AnySocket {
     fn subject<N: Nominal>(&self, length: &impl Fn(&str) -> N) -> Subject<N> {
         Subject::Station(Station::Socket(Socket {
-            ball: [length("S_x"), length("S_y"), length("S_z")],
+            ball: Target::on_tool([length("S_x"), length("S_y"), length("S_z")]),
             socket: [400.0, 100.0, 60.0].map(N::constant),
             is_located: true,
         }))

@@ -143,8 +143,8 @@ impl abbe_codegen::Source for Bar {
         let zero = N::constant(0.0);
         abbe_codegen::Subject::Station(abbe_model::instrument::Station::BallBar(
             abbe_model::instrument::ballbar::BallBar {
-                workpiece_ball: [zero, r, length("H") - length("Z_CA")],
-                spindle_ball: [-d, zero, zero],
+                workpiece_ball: abbe_model::instrument::Target::on_table([zero, r, length("H") - length("Z_CA")]),
+                spindle_ball: abbe_model::instrument::Target::on_tool([-d, zero, zero]),
                 bar: l,
             },
         ))

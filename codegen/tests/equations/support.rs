@@ -6,7 +6,7 @@ use abbe_codegen::{Equation, Source, Subject, check, language};
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::frames::Rotation;
-use abbe_model::instrument::{Station, ballbar::BallBar};
+use abbe_model::instrument::{Station, Target, ballbar::BallBar};
 use abbe_model::scalar::Nominal;
 
 /// The machine of seed 000.
@@ -28,8 +28,8 @@ impl Source for Chapter5 {
         let zero = N::constant(0.0);
         let d = if self.extended { -length("D") } else { zero };
         Subject::Station(Station::BallBar(BallBar {
-            workpiece_ball: [zero, length("R"), length("H") - length("Z_CA")],
-            spindle_ball: [d, zero, zero],
+            workpiece_ball: Target::on_table([zero, length("R"), length("H") - length("Z_CA")]),
+            spindle_ball: Target::on_tool([d, zero, zero]),
             bar: length("R"),
         }))
     }

@@ -3,11 +3,11 @@
 
 use abbe_codegen::{Source, Subject};
 use abbe_model::axis::AxisKind;
-use abbe_model::chain::{AxisPosition, Machine};
+use abbe_model::chain::{AxisPosition, Frame, Machine};
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
 use abbe_model::frames::Point;
-use abbe_model::instrument::Station;
 use abbe_model::instrument::ballbar::BallBar;
+use abbe_model::instrument::{Station, Target};
 use abbe_model::scalar::Nominal;
 use num_dual::{Derivative, DualSVec64};
 use rand::RngExt;
@@ -64,8 +64,8 @@ pub struct AnyBar;
 impl Source for AnyBar {
     fn subject<N: Nominal>(&self, length: &impl Fn(&str) -> N) -> Subject<N> {
         Subject::Station(Station::BallBar(BallBar {
-            workpiece_ball: [length("W_x"), length("W_y"), length("W_z")],
-            spindle_ball: [length("S_x"), length("S_y"), length("S_z")],
+            workpiece_ball: Target::on_table([length("W_x"), length("W_y"), length("W_z")]),
+            spindle_ball: Target::on_tool([length("S_x"), length("S_y"), length("S_z")]),
             bar: N::constant(100.0),
         }))
     }
@@ -142,13 +142,17 @@ fn case(what: What, machine: &Machine, errors: &[ErrorName], random: &mut impl r
         let read: Vec<Pack> = match what {
             What::Bar => {
                 let l = |i: usize| lengths[i];
-                let bar = BallBar { workpiece_ball: [l(0), l(1), l(2)], spindle_ball: [l(3), l(4), l(5)], bar: 100.0 };
+                let (workpiece_ball, spindle_ball) =
+                    (Target::on_table([l(0), l(1), l(2)]), Target::on_tool([l(3), l(4), l(5)]));
+                let bar = BallBar { workpiece_ball, spindle_ball, bar: 100.0 };
                 Station::BallBar(bar).read(machine, &state, &bodies, |_| None).channels().to_vec()
             }
             What::Volumetric => {
                 let none = machine.body_errors::<Pack>(|_| false, |_| Pack::from_re(0.0));
                 let tool = Point::<Pack>::nominal([lengths[0], lengths[1], lengths[2]]);
-                let seen = |bodies: &[_]| machine.table_point(&state, bodies, machine.tool_point(&state, bodies, tool));
+                let seen = |bodies: &[_]| {
+                    machine.in_frame(Frame::Table, &state, bodies, machine.in_r(Frame::Tool, &state, bodies, tool))
+                };
                 seen(&bodies).minus(seen(&none)).0.to_vec()
             }
         };

@@ -1,6 +1,6 @@
 //! Set-ups shared by tests.
 
-use abbe_model::instrument::{InstrumentKind, SharedBy};
+use abbe_model::instrument::{InstrumentKind, SharedBy, Target};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Prior, Test};
 
@@ -12,10 +12,10 @@ pub(crate) fn differing(earlier: &[Test], test: &Test) -> Vec<String> {
         let Some(first) = earlier.iter().find(|other| other.group(group) == test.group(group)) else {
             continue;
         };
-        let own = |test: &Test| -> (Vec<Prior>, [f64; 3]) {
+        let own = |test: &Test| -> (Vec<Prior>, Target<f64>) {
             let priors = unknowns.iter().zip(&test.priors);
             let priors = priors.filter(|(unknown, _)| unknown.shared_by == group);
-            (priors.map(|(_, prior)| *prior).collect(), test.station.shared_mm(group))
+            (priors.map(|(_, prior)| *prior).collect(), test.station.shared(group))
         };
         if own(first) != own(test) {
             warnings.push(format!(

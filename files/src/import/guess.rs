@@ -28,8 +28,8 @@ fn any_set_up(kind: InstrumentKind) -> Node {
 }
 
 /// A set-up of an instrument, as a session states it.
-pub(super) fn station(kind: InstrumentKind, set_up: &Node) -> Option<Station<f64>> {
-    let read = (kind.entry().read)(set_up, &[]).ok()?;
+pub(super) fn station(kind: InstrumentKind, set_up: &Node, machine: &Machine) -> Option<Station<f64>> {
+    let read = kind.entry().set_up(set_up, &[], machine).ok()?;
     Some(read.station.map(|length| length.mm))
 }
 
@@ -54,7 +54,7 @@ pub fn instrument(bytes: &[u8], machine: &Machine, hints: &[Hint]) -> Result<Ins
     let mut fitting: Vec<(usize, InstrumentKind)> = Vec::new();
     let mut of_most: Option<Fault> = None;
     for &kind in InstrumentKind::ALL {
-        let Some(station) = station(kind, &any_set_up(kind)) else { continue };
+        let Some(station) = station(kind, &any_set_up(kind), machine) else { continue };
         let expected =
             Expected { machine, station: &station, circle: None, moved: only_axis(machine), planned: None, hints };
         match hint::found(&grid, &expected).and_then(|found| meaning::of(&grid, &expected, found)) {

@@ -382,7 +382,7 @@ impl Draft {
         let mut stated = None;
         for test in &found.tests {
             // The start of a fit needs no more.
-            let point = test.station.tool_point_mm().map(|x| (x * 10.0).round() / 10.0);
+            let point = test.station.tool_point().mm.map(|x| (x * 10.0).round() / 10.0);
             let name = test.name.split('/').next().unwrap_or_default();
             self.text.set_of_test(name, key, &Node::from_iter(point))?;
             stated = Some(point);

@@ -130,9 +130,9 @@ pub(super) fn tests(
 /// The instrument's keys of a test.
 fn set_up(kind: InstrumentKind, keys: &Node, context: &Context<'_>) -> Result<SetUp, Fault> {
     let own = kind.entry();
-    (own.read)(keys, context.constants).map_err(|fault| {
+    own.set_up(keys, context.constants, context.machine).map_err(|fault| {
         let Some(key) = fault.unknown().map(str::to_string) else { return fault };
-        match kinds().iter().find(|kind| (kind.entry().keys)().contains_key(&key)) {
+        match kinds().iter().find(|kind| kind.entry().keys().contains_key(&key)) {
             Some(kind) => {
                 let whose = if own.kind == context.instrument { "session" } else { "test" };
                 let what = format!(

@@ -155,7 +155,7 @@ fn line(context: &Context<'_>, document: &document::Line) -> Result<Motion, Faul
 }
 
 fn follow(context: &Context<'_>, document: &document::Follow, station: &Station<f64>) -> Result<Motion, Fault> {
-    if station.table_point_mm().is_none() {
+    if station.table_point().is_none() {
         let message =
             "a path of kind \"follow\" needs an instrument with a point of the table: a ball bar, an R-test or a probe";
         return Err(Fault::new(message, None));
@@ -290,10 +290,10 @@ fn programmed_speed(
 /// Distance of the carried ball from a rotary axis, mm.
 fn radius_on_axis(context: &Context<'_>, axis: usize, station: &Station<f64>) -> Result<f64, Fault> {
     let carried = match station {
-        station if axis < context.machine.workpiece_side => station.table_point_mm().unwrap_or(station.tool_point_mm()),
-        station => station.tool_point_mm(),
+        station if axis < context.machine.workpiece_side => station.table_point().unwrap_or(station.tool_point()),
+        station => station.tool_point(),
     };
-    let radius = radius_about(&context.machine.axes[axis], carried);
+    let radius = radius_about(&context.machine.axes[axis], carried.mm);
     if radius < 1e-3 {
         return Err(Fault::of_key("of a ball that lies on its axis of rotation", "use `feed_deg_min`"));
     }

@@ -14,9 +14,9 @@ use abbe_model::document::edit::SessionText;
 use abbe_model::driver::Driver;
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::frames::Rotation;
-use abbe_model::instrument::Station;
 use abbe_model::instrument::stand::Stand;
 use abbe_model::instrument::tracker::Tracker;
+use abbe_model::instrument::{Station, Target};
 use abbe_model::session::Session;
 use abbe_model::session::readings::Readings;
 use proptest::collection::vec;
@@ -125,7 +125,7 @@ proptest! {
         let session = session.to_string();
         fs::write(folder.path().join("session.toml"), &session).unwrap();
         let station = Station::Tracker(Tracker {
-            target: [1.0, 2.0, 3.0],
+            target: Target::on_tool([1.0, 2.0, 3.0]),
             stand: Stand { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], origin: [0.0; 3] },
             is_polar: false,
         });

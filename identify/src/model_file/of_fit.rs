@@ -72,8 +72,8 @@ impl IdentifiedModel {
             },
             ranges: range::of_problem(problem, &problem.parameters.effects),
             motion_ranges: motion::of_problem(problem),
-            tool_mm: stated.tool_point_mm(),
-            table_mm: stated.table_point_mm().unwrap_or_default(),
+            tool_mm: stated.tool_point().mm,
+            table_mm: stated.table_point().map_or([0.0; 3], |point| point.mm),
             reference: Reference::without_history(problem.reference.time_s, problem.reference.means.clone()),
             provenance,
         };

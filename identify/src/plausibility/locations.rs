@@ -48,7 +48,7 @@ struct Judged {
 /// its limit first.
 pub(super) fn conflicts(problem: &Problem, fit: &Fit) -> Vec<Conflict> {
     let machine = &problem.session.machine;
-    let tool = problem.models.first().map(|model| model.station().tool_point_mm()).unwrap_or_default();
+    let tool = problem.models.first().map(|model| model.station().tool_point().mm).unwrap_or_default();
     let links = links_mm(machine, tool);
     let slots = slots(problem);
     let mut found: Vec<(f64, Conflict)> = Vec::new();

@@ -55,7 +55,7 @@ pub(super) fn spread_mm2(problem: &Problem) -> Option<f64> {
                     let by = (axis * 7 + 1) % column.len().max(1);
                     column.rotate_left(by);
                 }
-                points.extend(mixed.nominal_points(&problem.session.machine, test.station.tool_point_mm()));
+                points.extend(mixed.nominal_points(&problem.session.machine, &test.station.tool_point()));
                 continue;
             }
             for (row, values) in readings.observed.chunks_exact(readings.channels).enumerate() {

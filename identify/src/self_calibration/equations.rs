@@ -247,8 +247,8 @@ impl Equations {
         let state = &model.state(row);
         let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
         let origin = machine.axes[self.axis].origin_mm;
-        let stylus = machine.tool_point::<f64>(state, &none, Point(probe.stylus));
-        let on_table = machine.table_point::<f64>(state, &none, stylus);
+        let stylus = probe.stylus.nominal_in_r::<f64>(machine, state);
+        let on_table = machine.in_frame::<f64>(probe.artefact.frame, state, &none, stylus);
         let angle_of = |point: Point<f64>| {
             let [first, second] = self.across.map(|k| point.0[k] - origin[k]);
             second.atan2(first)

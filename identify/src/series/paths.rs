@@ -4,8 +4,7 @@
 //! chain at the states of the first run.
 
 use abbe_model::axis::AxisKind;
-use abbe_model::chain::{BodyErrors, Machine};
-use abbe_model::frames::Point;
+use abbe_model::chain::Machine;
 use abbe_model::instrument::Station;
 use abbe_model::session::placing;
 use abbe_model::session::readings::Readings;
@@ -44,7 +43,6 @@ pub fn set_ups(problem: &Problem) -> Vec<SetUpPath> {
 
 /// The set-up of a test at these states; `None` without states.
 pub fn set_up(machine: &Machine, test: &str, station: &Station<f64>, readings: &Readings) -> Option<SetUpPath> {
-    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let run = readings.runs().first().cloned()?;
     let (mut workpiece_mm, mut tool_mm, mut state) = (Vec::new(), Vec::new(), Vec::new());
     let first: Vec<f64> = readings.positions.iter().map(|positions| positions[run.start]).collect();
@@ -52,9 +50,8 @@ pub fn set_up(machine: &Machine, test: &str, station: &Station<f64>, readings: &
     let rows: Vec<usize> = run.clone().step_by(run.len().div_ceil(MAX_POINTS)).chain([run.end - 1]).collect();
     for row in &rows {
         readings.state(machine, *row, &mut state);
-        let on_table = station.table_point_mm();
-        workpiece_mm.extend(on_table.map(|point| machine.workpiece_point(&state, &none, Point(point)).0));
-        tool_mm.push(machine.tool_point(&state, &none, Point(station.tool_point_mm())).0);
+        workpiece_mm.extend(station.table_point().map(|point| point.nominal_mm(machine, &state)));
+        tool_mm.push(station.tool_point().nominal_mm(machine, &state));
     }
     let rotary = (0..machine.axes.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary);
     let line = |axis: usize| {

@@ -113,7 +113,7 @@ pub fn views(problem: &Problem, series: &SessionSeries) -> Vec<View> {
         let Some(columns) = &test.readings else { continue };
         let channels = readings.channels;
         let [of_before, of_after] = [&readings.before_um, &readings.after_um].map(|values| lengths(values, channels));
-        let nominal = columns.nominal_points(machine, test.station.tool_point_mm());
+        let nominal = columns.nominal_points(machine, &test.station.tool_point());
         for row in (0..columns.rows()).filter(|row| problem.counts(number, row * channels)) {
             points.push(nominal[row].into());
             joints.iter_mut().zip(&columns.positions).for_each(|(all, axis)| all.push(axis[row].to_degrees()));

@@ -10,16 +10,17 @@
 //! The same holds for the reflector with the roles exchanged. Where both are unknown they are found in turn.
 
 use abbe_model::chain::{BodyErrors, Machine};
-use abbe_model::frames::Point;
-use abbe_model::instrument::distance::{Distance, StationFrame};
-use abbe_model::instrument::{SharedBy, Station};
+use abbe_model::instrument::{InstrumentKind, SharedBy, Station};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Prior, Session, Test};
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::{MAX_ROWS, is_unknown};
-use crate::set_up_points::{REFLECTOR, STATION};
+use super::{MAX_ROWS, is_unknown, set_point};
+use crate::set_up_points::{point_mm, points};
 
+/// The sides of the station and of the reflector among the points of a set-up.
+const STATION: usize = 0;
+const REFLECTOR: usize = 1;
 /// The parameter of the dead path.
 const ZERO: usize = 6;
 /// Maximum number of turns, and the step at which they end, mm.
@@ -30,30 +31,32 @@ const OPEN: f64 = 1e-9;
 
 /// Moves stations and reflectors without a prior to where the nominal machine explains the distances best.
 pub(super) fn locate(session: &Session, tests: &mut [Test]) {
-    let is_open = |test: &Test| {
-        matches!(test.station, Station::Distance(_)) && (is_unknown(test, STATION) || is_unknown(test, REFLECTOR))
+    let is_open = |test: &Test, side: usize| {
+        let first = points(&test.station)[side];
+        test.station.kind() == InstrumentKind::Distance && first.is_some_and(|first| is_unknown(test, first))
     };
-    if !tests.iter().any(is_open) {
+    if !tests.iter().any(|test| is_open(test, STATION) || is_open(test, REFLECTOR)) {
         return;
     }
     for _ in 0..MAX_ROUNDS {
         let mut largest = 0.0_f64;
-        for (first, by) in [(STATION, SharedBy::Setup), (REFLECTOR, SharedBy::SpindleSetup)] {
-            let open = |test: &Test| matches!(test.station, Station::Distance(_)) && is_unknown(test, first);
+        for (side, by) in [(STATION, SharedBy::Setup), (REFLECTOR, SharedBy::SpindleSetup)] {
             let mut groups: Vec<String> =
-                tests.iter().filter(|test| open(test)).map(|test| test.group(by).into()).collect();
+                tests.iter().filter(|test| is_open(test, side)).map(|test| test.group(by).into()).collect();
             groups.sort_unstable();
             groups.dedup();
             for group in groups {
                 let members: Vec<usize> =
-                    (0..tests.len()).filter(|k| open(&tests[*k]) && tests[*k].group(by) == group).collect();
+                    (0..tests.len()).filter(|k| is_open(&tests[*k], side) && tests[*k].group(by) == group).collect();
                 // One object has one place, however differently its tests state it.
-                let Station::Distance(distance) = &tests[members[0]].station else { continue };
-                let place = if first == STATION { distance.station } else { distance.reflector };
-                move_to(tests, &members, first, place);
-                let Some(step) = step(&session.machine, tests, &members, first) else { continue };
+                let Some(place) = point_mm(&tests[members[0]].station, side) else { continue };
+                let move_to = |tests: &mut [Test], to| {
+                    members.iter().for_each(|member| set_point(&mut tests[*member].station, side, to));
+                };
+                move_to(tests, place);
+                let Some(step) = step(&session.machine, tests, &members, side) else { continue };
                 largest = largest.max(step.norm());
-                move_to(tests, &members, first, std::array::from_fn(|k| place[k] + step[k]));
+                move_to(tests, std::array::from_fn(|k| place[k] + step[k]));
             }
         }
         if largest < SETTLED_MM {
@@ -62,17 +65,8 @@ pub(super) fn locate(session: &Session, tests: &mut [Test]) {
     }
 }
 
-/// Moves the station or the reflector of some tests.
-fn move_to(tests: &mut [Test], members: &[usize], first: usize, place: [f64; 3]) {
-    for member in members {
-        if let Station::Distance(distance) = &mut tests[*member].station {
-            *(if first == STATION { &mut distance.station } else { &mut distance.reflector }) = place;
-        }
-    }
-}
-
 /// The step of a station, or of a reflector, that tests share. Each station has a dead path of its own.
-fn step(machine: &Machine, tests: &[Test], members: &[usize], first: usize) -> Option<Vector3<f64>> {
+fn step(machine: &Machine, tests: &[Test], members: &[usize], side: usize) -> Option<Vector3<f64>> {
     let mut places: Vec<&str> = members.iter().map(|member| tests[*member].setup.as_str()).collect();
     places.sort_unstable();
     places.dedup();
@@ -80,10 +74,10 @@ fn step(machine: &Machine, tests: &[Test], members: &[usize], first: usize) -> O
     let mut rows: Vec<(DVector<f64>, f64)> = Vec::new();
     for member in members {
         let test = &tests[*member];
-        let (Station::Distance(distance), Some(readings)) = (&test.station, &test.readings) else { continue };
+        let Some(readings) = &test.readings else { continue };
         let has_zero = test.priors.get(ZERO) == Some(&Prior::Free);
         let place = 3 + 2 * places.iter().position(|place| *place == test.setup)?;
-        for (apart, read) in sights(machine, distance, readings, first) {
+        for (apart, read) in sights(machine, &test.station, readings, side) {
             let mut row = DVector::zeros(count);
             (0..3).for_each(|k| row[k] = 2.0 * apart[k]);
             row[place] = if has_zero { 2.0 * read } else { 0.0 };
@@ -105,7 +99,10 @@ fn step(machine: &Machine, tests: &[Test], members: &[usize], first: usize) -> O
 }
 
 /// From the other point to the one that moves, in the frame of the latter, mm, and the distance that was read.
-fn sights(machine: &Machine, distance: &Distance<f64>, readings: &Readings, first: usize) -> Vec<(Vector3<f64>, f64)> {
+fn sights(machine: &Machine, station: &Station<f64>, readings: &Readings, side: usize) -> Vec<(Vector3<f64>, f64)> {
+    let mut own = station.clone();
+    let [Some(station), Some(reflector)] = own.points_mut() else { return Vec::new() };
+    let (moving, other) = if side == STATION { (station, reflector) } else { (reflector, station) };
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let mut state = Vec::new();
     let every = readings.rows().div_ceil(MAX_ROWS).max(1);
@@ -113,20 +110,8 @@ fn sights(machine: &Machine, distance: &Distance<f64>, readings: &Readings, firs
     for row in (0..readings.rows()).step_by(every) {
         readings.state(machine, row, &mut state);
         let read = readings.observed[row * readings.channels];
-        let apart = if first == STATION {
-            let reflector = machine.tool_point::<f64>(&state, &none, Point(distance.reflector));
-            let seen = match distance.frame {
-                StationFrame::Table => machine.table_point(&state, &none, reflector),
-                StationFrame::Bed => reflector,
-            };
-            Vector3::from(distance.station) - Vector3::from(seen.0)
-        } else {
-            let station = match distance.frame {
-                StationFrame::Table => machine.workpiece_point::<f64>(&state, &none, Point(distance.station)),
-                StationFrame::Bed => Point(distance.station),
-            };
-            Vector3::from(distance.reflector) - Vector3::from(machine.spindle_point(&state, &none, station).0)
-        };
+        let seen = machine.in_frame(moving.frame, &state, &none, other.nominal_in_r(machine, &state));
+        let apart = Vector3::from(moving.mm) - Vector3::from(seen.0);
         if read.is_finite() {
             sights.push((apart, read));
         }

@@ -8,7 +8,7 @@
 //! where it is stated.
 
 use abbe_model::chain::Machine;
-use abbe_model::instrument::{Group, InstrumentKind, SharedBy, Station};
+use abbe_model::instrument::{Group, InstrumentKind, SharedBy, Station, Target};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
 use nalgebra::{Matrix3, Vector3};
@@ -78,8 +78,11 @@ impl Member {
         let step = readings.rows().div_ceil(MAX_ROWS).max(1);
         let readings = readings.of_rows(&(0..readings.rows()).step_by(step).collect::<Vec<_>>());
         let (readings, observed) = complete(&test.station, &readings);
-        let stated = Vector3::from(test.station.tool_point_mm());
-        let points = |by: Vector3<f64>| readings.nominal_points(&session.machine, (stated + by).into());
+        let stated = test.station.tool_point();
+        let points = |by: Vector3<f64>| {
+            let moved = Target { mm: (Vector3::from(stated.mm) + by).into(), ..stated };
+            readings.nominal_points(&session.machine, &moved)
+        };
         let origin = points(Vector3::zeros());
         let units = [Vector3::x(), Vector3::y(), Vector3::z()].map(points);
         let along =
@@ -115,7 +118,7 @@ fn complete(station: &Station<f64>, readings: &Readings) -> (Readings, Vec<Vecto
 /// The point that all members share.
 fn target(session: &Session, members: &[Member]) -> Option<Vector3<f64>> {
     let first = &members.first()?.station;
-    let stated = Vector3::from(first.tool_point_mm());
+    let stated = Vector3::from(first.tool_point().mm);
     if first.kind() == InstrumentKind::Socket {
         return linear(members, &vec![None; members.len()], Vector3::zeros()).map(|(step, _)| stated + step);
     }
@@ -158,7 +161,7 @@ fn orientation(machine: &Machine, members: &[Member], place: &str, step: Vector3
         .filter(|member| member.place == place)
         .map(|member| {
             let mut station = member.station.clone();
-            let target = Vector3::from(station.tool_point_mm()) + step;
+            let target = Vector3::from(station.tool_point().mm) + step;
             set_point(&mut station, TOOL, target.into());
             (station, &member.readings)
         })

@@ -13,6 +13,7 @@ use super::session::Session;
 use crate::driver::{Driver, unit_suffixes};
 use crate::effect::keys::{Key, KeyForm};
 use crate::effect::shape::{Entry, SHAPES};
+use crate::instrument::set_up::FRAME;
 use crate::instrument::{InstrumentKind, kinds};
 use crate::words::listed;
 
@@ -39,7 +40,7 @@ pub fn session() -> Value {
 /// The keys of a test of an instrument, with their schemas.
 pub fn keys_of_test(instrument: InstrumentKind) -> Map<String, Value> {
     let mut keys = properties::<Test>();
-    keys.extend((instrument.entry().keys)());
+    keys.extend(instrument.entry().keys());
     keys
 }
 
@@ -175,10 +176,10 @@ pub(crate) fn description<T: JsonSchema>(key: &str) -> Option<String> {
 fn test_properties() -> Map<String, Value> {
     let mut properties: Map<String, Value> = Map::new();
     for kind in kinds() {
-        for (key, mut schema) in (kind.entry().keys)() {
+        for (key, mut schema) in kind.entry().keys() {
             let own = schema["description"].as_str().unwrap_or_default();
-            // An uncertainty means the same to every instrument.
-            if !key.contains("_u_") {
+            // An uncertainty, or a frame, means the same to every instrument.
+            if !key.contains("_u_") && !key.ends_with(FRAME) {
                 let others = properties.get(&key).and_then(|other| other["description"].as_str());
                 let others = others.map_or(String::new(), |others| format!("{}; ", others.trim_end_matches('.')));
                 schema["description"] = json!(format!("{others}{}: {}.", kind.word(), as_end(own)));

@@ -32,15 +32,14 @@ impl DriverKind for Gravity<'_> {
         let DriverInput { machine, model, .. } = input;
         let axis = input.component_axis?;
         let station = model.station();
-        let point =
-            if axis < machine.workpiece_side { station.table_point_mm() } else { Some(station.tool_point_mm()) };
+        let point = if axis < machine.workpiece_side { station.table_point() } else { Some(station.tool_point()) };
         let loaded = match self.at {
             Some(name) => Some(machine.axis_index(name)?),
             None => None,
         };
         let moment = |row| match loaded {
             Some(loaded) => machine.gravity_moment_of_axis_mm(axis, &model.state(row), loaded),
-            None => Some(machine.gravity_moment_mm(axis, &model.state(row), point?)),
+            None => point.map(|point| machine.gravity_moment_mm(axis, &model.state(row), point.frame, point.mm)),
         };
         let sample = |row| Some(DriverSample::plain(Unit::Metre.to_display(moment(row)?), 0.0));
         (0..model.rows()).map(sample).collect()

@@ -11,20 +11,19 @@ use super::column::{Column, Quantity};
 use super::check::check_small;
 use super::kind::Checked;
 use super::operation::direction_in_words;
-use super::set_up::{self, SetUp, Written};
+use super::set_up::{self, SetUp, Stated, Written};
 use super::{Aligned, Travel, 
     Entry, Fault, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
     point,
 };
 use crate::axis::AxisKind;
-use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::chain::MachineState;
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
 use crate::frames::dot_nominal;
 use crate::rotation_error::Body;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
-use crate::session::expression::Constant;
 use crate::unit::Unit;
 
 /// The zero of each channel.
@@ -37,7 +36,7 @@ pub(super) const ENTRY: Entry = Entry {
     is_two_sided: true,
     rows_can_lack_channels: true,
     needs_every_axis: false,
-    ..Entry::new(InstrumentKind::Angle, ["angle", "a sensor of angles"], &PARAMETERS, schema::properties::<Keys>, read)
+    ..Entry::new(InstrumentKind::Angle, ["angle", "a sensor of angles"], &PARAMETERS, schema::properties::<Keys>, &[], read)
 };
 
 /// A direction is horizontal if its component along gravity is smaller.
@@ -65,8 +64,8 @@ struct Keys {
     body: Body,
 }
 
-fn read(set_up: &Node, _: &[Constant]) -> Result<SetUp, KeyFault> {
-    let keys: Keys = set_up::keys(set_up)?;
+fn read(set_up: &Stated<'_>) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up.keys()?;
     if keys.about.0.len() > CHANNELS.len() {
         let message = format!("has {} directions; an angle has one or two", keys.about.0.len());
         return Err(KeyFault::of_key(message, None).at("about"));
@@ -95,15 +94,13 @@ impl<N> Geometry<N> for Angle<N> {
     /// The rotation about each direction, rad.
     fn reading<S: Scalar<Nominal = N>>(
         &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
+        at: MachineState<'_, S>,
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Reading<S>
     where
         N: Nominal,
     {
-        let rotation = machine.rotation_error(state, errors, self.body);
+        let rotation = at.machine.rotation_error(at.state, at.errors, self.body.frames());
         Reading::of(self.about.iter().enumerate().map(|(channel, about)| {
             let angle = dot_nominal(rotation, *about);
             unknown(channel).map_or(angle, |zero| angle + zero)

@@ -9,40 +9,38 @@ use serde::{Deserialize, Serialize};
 use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::check::{MAX_MM, doubt_on_scatter};
-use super::set_up::{self, SetUp};
-use super::{Contact, Checked, Entry, Fault, Following, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station, default_errors, displaced, point};
+use super::set_up::{self, SetUp, Stated};
+use super::{Contact, Checked, Entry, Fault, Following, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station, Target, default_errors};
 use crate::median::median;
-use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::chain::{AxisPosition, Frame, Machine, MachineState};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
-use crate::session::expression::Constant;
 use crate::unit::{InternalUnit, Unit};
 
 /// Both balls, the length of the bar, the gain of the sensor.
-pub const PARAMETERS: [InstrumentParameter; 8] = [
-    InstrumentParameter::length("workpiece_ball", "x", SharedBy::Setup),
-    InstrumentParameter::length("workpiece_ball", "y", SharedBy::Setup),
-    InstrumentParameter::length("workpiece_ball", "z", SharedBy::Setup),
-    InstrumentParameter::length("spindle_ball", "x", SharedBy::SpindleSetup),
-    InstrumentParameter::length("spindle_ball", "y", SharedBy::SpindleSetup),
-    InstrumentParameter::length("spindle_ball", "z", SharedBy::SpindleSetup),
-    InstrumentParameter::length("bar", "", SharedBy::BarSetup),
-    InstrumentParameter::new("gain", "", InternalUnit::Ratio, SharedBy::Session),
-];
+pub const PARAMETERS: [InstrumentParameter; 8] = InstrumentParameter::all(&[
+    &InstrumentParameter::point("workpiece_ball", SharedBy::Setup),
+    &InstrumentParameter::point("spindle_ball", SharedBy::SpindleSetup),
+    &[InstrumentParameter::length("bar", "", SharedBy::BarSetup)],
+    &[InstrumentParameter::new("gain", "", InternalUnit::Ratio, SharedBy::Session)],
+]);
 
 /// Index of the length of the bar in [`PARAMETERS`].
 pub const BAR: usize = 6;
 /// Index of the gain of the sensor in [`PARAMETERS`].
 pub const GAIN: usize = 7;
 
+/// The points on bodies, that of the table first.
+const POINTS: &[(&str, Frame)] = &[("workpiece_ball", Frame::Table), ("spindle_ball", Frame::Tool)];
+
 pub(super) const ENTRY: Entry = Entry {
     is_two_sided: true,
     needs_every_axis: false,
     default_errors: default_errors::positions_and_orientations,
-    ..Entry::new(InstrumentKind::BallBar, ["ballbar", "a double ball bar"], &PARAMETERS, schema::properties::<Keys>, read)
+    ..Entry::new(InstrumentKind::BallBar, ["ballbar", "a double ball bar"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
 };
 
 /// The channels.
@@ -75,11 +73,11 @@ struct Keys {
     bar_setup: Option<String>,
 }
 
-fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
-    let keys: Keys = set_up::keys(set_up)?;
-    let bar = set_up::positive("bar_mm", &keys.bar_mm, constants)?;
-    let workpiece_ball = set_up::point("workpiece_ball_mm", &keys.workpiece_ball_mm, constants)?;
-    let spindle_ball = set_up::point("spindle_ball_mm", &keys.spindle_ball_mm, constants)?;
+fn read(set_up: &Stated<'_>) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up.keys()?;
+    let bar = set_up.positive("bar_mm", &keys.bar_mm)?;
+    let workpiece_ball = set_up.point("workpiece_ball", &keys.workpiece_ball_mm)?;
+    let spindle_ball = set_up.point("spindle_ball", &keys.spindle_ball_mm)?;
     let balls = set_up::lengths(&keys.workpiece_ball_u_um).chain(set_up::lengths(&keys.spindle_ball_u_um));
     // The bar, and the gain of its sensor.
     let priors = balls.chain([set_up::length(keys.bar_u_um), Prior::Known]).collect();
@@ -91,13 +89,14 @@ fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
 ///
 /// ```
 /// use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
-/// use abbe_model::instrument::Station;
+/// use abbe_model::instrument::{Station, Target};
 /// use abbe_model::instrument::ballbar::{BAR, BallBar};
 ///
 /// let machine = Machine::from_code("wbXYZt")?;
 /// let state: Vec<_> = machine.axes.iter().map(|axis| AxisPosition::new(axis.kind, 0.0)).collect();
 /// let none = vec![BodyErrors::<f64>::NONE; 3];
-/// let bar = BallBar { workpiece_ball: [0.0; 3], spindle_ball: [60.0, 0.0, 80.0], bar: 100.0 };
+/// let spindle_ball = Target::on_tool([60.0, 0.0, 80.0]);
+/// let bar = BallBar { workpiece_ball: Target::on_table([0.0; 3]), spindle_ball, bar: 100.0 };
 /// let station = Station::BallBar(bar);
 /// assert_eq!(station.read(&machine, &state, &none, |_| None).channels(), [100.0]);
 /// // A bar that is 2 µm longer than stated reads 2 µm less.
@@ -107,26 +106,33 @@ fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct BallBar<N> {
-    /// Centre of the workpiece ball in the table frame.
-    pub workpiece_ball: [N; 3],
-    /// Centre of the spindle ball in the tool frame.
-    pub spindle_ball: [N; 3],
+    /// Centre of the workpiece ball.
+    pub workpiece_ball: Target<N>,
+    /// Centre of the spindle ball.
+    pub spindle_ball: Target<N>,
     /// Calibrated length of the bar.
     pub bar: N,
+}
+
+impl BallBar<f64> {
+    /// From the origin of the table frame to that of the tool frame, of no length.
+    pub const ORIGINS: BallBar<f64> =
+        BallBar { workpiece_ball: Target::on_table([0.0; 3]), spindle_ball: Target::on_tool([0.0; 3]), bar: 0.0 };
+
+    /// The two ball centres in R, nominal: workpiece ball, spindle ball; mm.
+    pub fn nominal_mm(&self, machine: &Machine, state: &[AxisPosition<f64>]) -> [[f64; 3]; 2] {
+        [self.workpiece_ball, self.spindle_ball].map(|ball| ball.nominal_mm(machine, state))
+    }
 }
 
 impl<N: Nominal> BallBar<N> {
     /// The two ball centres in R: workpiece ball, spindle ball.
     pub fn balls<S: Scalar<Nominal = N>>(
         &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
+        at: MachineState<'_, S>,
         unknown: &impl Fn(usize) -> Option<S>,
     ) -> (Point<S>, Point<S>) {
-        let workpiece = displaced(self.workpiece_ball, 0, unknown);
-        let spindle = displaced(self.spindle_ball, 3, unknown);
-        (machine.workpiece_point(state, errors, workpiece), machine.tool_point(state, errors, spindle))
+        (self.workpiece_ball.in_r(at, 0, unknown), self.spindle_ball.in_r(at, 3, unknown))
     }
 }
 
@@ -135,23 +141,21 @@ impl<N> Geometry<N> for BallBar<N> {
 
     fn map<M>(&self, to: &impl Fn(&N) -> M) -> BallBar<M> {
         BallBar {
-            workpiece_ball: point(&self.workpiece_ball, to),
-            spindle_ball: point(&self.spindle_ball, to),
+            workpiece_ball: self.workpiece_ball.map(to),
+            spindle_ball: self.spindle_ball.map(to),
             bar: to(&self.bar),
         }
     }
     /// The reading, mm.
     fn reading<S: Scalar<Nominal = N>>(
         &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
+        at: MachineState<'_, S>,
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Reading<S>
     where
         N: Nominal,
     {
-        let (workpiece, spindle) = self.balls(machine, state, errors, &unknown);
+        let (workpiece, spindle) = self.balls(at, &unknown);
         let distance = workpiece.minus(spindle).norm();
         let length = match unknown(BAR) {
             Some(bar) => distance - bar,
@@ -175,9 +179,9 @@ impl Instrument for BallBar<f64> {
         let keys = Keys {
             bar_mm: set_up::rounded(self.bar).into(),
             bar_u_um: set_up::written_u(priors.get(BAR), Unit::Micrometre),
-            workpiece_ball_mm: set_up::written_point(self.workpiece_ball),
+            workpiece_ball_mm: set_up::written_point(self.workpiece_ball.mm),
             workpiece_ball_u_um: set_up::written_lengths(priors, 0),
-            spindle_ball_mm: set_up::written_point(self.spindle_ball),
+            spindle_ball_mm: set_up::written_point(self.spindle_ball.mm),
             spindle_ball_u_um: set_up::written_lengths(priors, 3),
             bar_setup: None,
         };
@@ -194,7 +198,7 @@ impl Instrument for BallBar<f64> {
     fn contact(&self) -> Contact {
         Contact::AtDistance(self.bar)
     }
-    fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
+    fn points_mut(&mut self) -> [Option<&mut Target<f64>>; 2] {
         [Some(&mut self.workpiece_ball), Some(&mut self.spindle_ball)]
     }
     fn channels(&self) -> &[Channel] {
@@ -210,9 +214,6 @@ impl Instrument for BallBar<f64> {
     }
     fn reference_mm(&self) -> f64 {
         self.bar
-    }
-    fn balls_mut(&mut self) -> Option<[&mut [f64; 3]; 2]> {
-        Some([&mut self.workpiece_ball, &mut self.spindle_ball])
     }
     fn following(&self) -> Following {
         Following::AtBar

@@ -7,32 +7,30 @@ use serde::{Deserialize, Serialize};
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
-use super::set_up::{self, SetUp};
+use super::set_up::{self, SetUp, Stated};
 use super::{Aligned, Travel, 
-    Checked, Entry, Fault, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
-    default_errors, displaced, point,
+    Checked, Entry, Fault, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station, Target,
+    default_errors,
 };
-use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::chain::{Frame, MachineState};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
-use crate::session::expression::Constant;
 use crate::unit::Unit;
 
 /// The station, the reflector in the tool frame, the dead path.
-pub const PARAMETERS: [InstrumentParameter; 7] = [
-    InstrumentParameter::length("station", "x", SharedBy::Setup),
-    InstrumentParameter::length("station", "y", SharedBy::Setup),
-    InstrumentParameter::length("station", "z", SharedBy::Setup),
-    InstrumentParameter::length("reflector", "x", SharedBy::SpindleSetup),
-    InstrumentParameter::length("reflector", "y", SharedBy::SpindleSetup),
-    InstrumentParameter::length("reflector", "z", SharedBy::SpindleSetup),
-    InstrumentParameter::length("zero", "", SharedBy::Setup),
-];
+pub const PARAMETERS: [InstrumentParameter; 7] = InstrumentParameter::all(&[
+    &InstrumentParameter::point("station", SharedBy::Setup),
+    &InstrumentParameter::point("reflector", SharedBy::SpindleSetup),
+    &[InstrumentParameter::length("zero", "", SharedBy::Setup)],
+]);
 
 /// Index of the dead path in [`PARAMETERS`].
 const ZERO: usize = 6;
+
+/// The points on bodies, that of the table first.
+const POINTS: &[(&str, Frame)] = &[("station", Frame::Table), ("reflector", Frame::Tool)];
 
 pub(super) const ENTRY: Entry = Entry {
     is_two_sided: true,
@@ -40,7 +38,7 @@ pub(super) const ENTRY: Entry = Entry {
     default_errors: default_errors::all_locations,
     // The reflector stays mounted while the station moves.
     spindle_setup: Some("tool"),
-    ..Entry::new(InstrumentKind::Distance, ["distance", "distances from a station"], &PARAMETERS, schema::properties::<Keys>, read)
+    ..Entry::new(InstrumentKind::Distance, ["distance", "distances from a station"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
 };
 
 /// The channels.
@@ -52,18 +50,6 @@ const COLUMNS: [Column; 1] = [Column::new("distance", Unit::Millimetre, Quantity
 /// Least distance: nearer, the direction of the beam is not defined, mm.
 const MIN_MM: f64 = 1.0;
 
-/// The body that carries the station.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-#[schemars(inline)]
-pub enum StationFrame {
-    /// The table frame.
-    #[default]
-    Table,
-    /// The bed: R.
-    Bed,
-}
-
 /// The keys of a test.
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -72,72 +58,58 @@ struct Keys {
     reflector_mm: document::Point,
     #[serde(default)]
     reflector_u_um: document::Uncertainties,
-    /// Station, in the frame that `station_frame` names.
+    /// Station, in the frame that `station_frame` names: that of the table by default.
     station_mm: document::Point,
     /// Standard uncertainty of each coordinate, µm; default: inf, no prior.
     #[serde(default = "document::Uncertainties::unknown")]
     station_u_um: document::Uncertainties,
-    /// The frame that carries the station: "table" (default) or "bed".
-    #[serde(default)]
-    station_frame: StationFrame,
     /// Standard uncertainty of the dead path, µm; default: inf, no prior.
     #[serde(default = "document::Uncertainty::unknown")]
     zero_u_um: document::Uncertainty,
 }
 
-fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
-    let keys: Keys = set_up::keys(set_up)?;
-    let reflector = set_up::point("reflector_mm", &keys.reflector_mm, constants)?;
-    let station = set_up::point("station_mm", &keys.station_mm, constants)?;
+fn read(set_up: &Stated<'_>) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up.keys()?;
+    let reflector = set_up.point("reflector", &keys.reflector_mm)?;
+    let station = set_up.point("station", &keys.station_mm)?;
     let points = set_up::lengths(&keys.station_u_um).chain(set_up::lengths(&keys.reflector_u_um));
     let priors = points.chain([set_up::length(keys.zero_u_um)]).collect();
-    Ok(SetUp::new(Station::Distance(Distance { station, reflector, frame: keys.station_frame }), priors))
+    Ok(SetUp::new(Station::Distance(Distance { station, reflector }), priors))
 }
 
 /// A station and its reflector, mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Distance<N> {
-    /// The station in its frame.
-    pub station: [N; 3],
-    /// The reflector in the tool frame.
-    pub reflector: [N; 3],
-    /// The frame that carries the station.
-    pub frame: StationFrame,
+    /// The station.
+    pub station: Target<N>,
+    /// The reflector.
+    pub reflector: Target<N>,
 }
 
 impl<N> Geometry<N> for Distance<N> {
     type Over<M> = Distance<M>;
 
     fn map<M>(&self, to: &impl Fn(&N) -> M) -> Distance<M> {
-        Distance {
-            station: point(&self.station, to),
-            reflector: point(&self.reflector, to),
-            frame: self.frame,
-        }
+        Distance { station: self.station.map(to), reflector: self.reflector.map(to) }
     }
     /// The distance, mm.
     fn reading<S: Scalar<Nominal = N>>(
         &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
+        at: MachineState<'_, S>,
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Reading<S>
     where
         N: Nominal,
     {
-        let station = displaced(self.station, 0, &unknown);
-        let station = match self.frame {
-            StationFrame::Table => machine.workpiece_point(state, errors, station),
-            StationFrame::Bed => station,
-        };
-        let reflector = machine.tool_point(state, errors, displaced(self.reflector, 3, &unknown));
+        let station = self.station.in_r(at, 0, &unknown);
+        let reflector = self.reflector.in_r(at, 3, &unknown);
         let distance = reflector.minus(station).norm();
         Reading::scalar(unknown(ZERO).map_or(distance, |zero| distance + zero))
     }
     fn points(&self) -> [Option<InstrumentPoint<'_, N>>; 2] {
-        let on_table = self.frame == StationFrame::Table;
-        let station = InstrumentPoint::of("station", &self.station, 0).filter(|_| on_table);
+        // A station on the bed stands beside the machine.
+        let is_on_bed = self.station.frame == Frame::Bed;
+        let station = InstrumentPoint::of("station", &self.station, 0).filter(|_| !is_on_bed);
         [station, InstrumentPoint::of("reflector", &self.reflector, 3)]
     }
 }
@@ -149,17 +121,16 @@ impl Instrument for Distance<f64> {
     }
     fn written(&self, priors: &[Prior]) -> Option<Node> {
         let keys = Keys {
-            reflector_mm: set_up::written_point(self.reflector),
+            reflector_mm: set_up::written_point(self.reflector.mm),
             reflector_u_um: set_up::written_lengths(priors, 3),
-            station_mm: set_up::written_point(self.station),
+            station_mm: set_up::written_point(self.station.mm),
             station_u_um: set_up::written_lengths(priors, 0),
-            station_frame: self.frame,
             zero_u_um: set_up::written_u(priors.get(ZERO), Unit::Micrometre),
         };
         set_up::written(&keys, &["station_u_um", "zero_u_um"])
     }
     fn handling(&self) -> Handling {
-        let beside = (self.frame == StationFrame::Bed).then(|| "Station, fixed to the bed: its place is estimated".into());
+        let beside = (self.station.frame == Frame::Bed).then(|| "Station, fixed to the bed: its place is estimated".into());
         Handling {
             beside,
             taken_off: Some("the reflector"),
@@ -168,7 +139,7 @@ impl Instrument for Distance<f64> {
             ..Handling::default()
         }
     }
-    fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
+    fn points_mut(&mut self) -> [Option<&mut Target<f64>>; 2] {
         [Some(&mut self.station), Some(&mut self.reflector)]
     }
     fn channels(&self) -> &[Channel] {

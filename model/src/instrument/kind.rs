@@ -6,9 +6,10 @@ use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::default_errors;
 use super::operation::{Aligned, Contact, Following, Handling, Travel};
-use super::set_up::SetUp;
+use super::set_up::{self, SetUp, Stated};
+use super::target::Target;
 use super::{InstrumentKind, InstrumentParameter, Reading, SharedBy, Station};
-use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::chain::{AxisPosition, BodyErrors, Frame, Machine, MachineState};
 use crate::component::ErrorName;
 use crate::document::Fault as KeyFault;
 use crate::document::node::Node;
@@ -47,10 +48,12 @@ pub struct Entry {
     /// The name that all tests share for the mounted object in the tool frame if a session states none; `None`: it is
     /// mounted for each test.
     pub spindle_setup: Option<&'static str>,
-    /// The schemas of the keys of a test that only some instruments have.
-    pub keys: fn() -> serde_json::Map<String, serde_json::Value>,
-    /// Reads the set-up of a test, whose lengths may be expressions in the constants.
-    pub read: fn(&Node, &[Constant]) -> Result<SetUp, KeyFault>,
+    /// The schemas of these keys, without the frames of points.
+    pub(super) keys: fn() -> serde_json::Map<String, serde_json::Value>,
+    /// Its points on bodies, each with its default frame. Each has a key with the suffix `_frame`.
+    pub points: &'static [(&'static str, Frame)],
+    /// Reads the set-up of a test.
+    pub(super) read: fn(&Stated<'_>) -> Result<SetUp, KeyFault>,
 }
 
 impl Entry {
@@ -61,7 +64,8 @@ impl Entry {
         [word, phrase]: [&'static str; 2],
         parameters: &'static [InstrumentParameter],
         keys: fn() -> serde_json::Map<String, serde_json::Value>,
-        read: fn(&Node, &[Constant]) -> Result<SetUp, KeyFault>,
+        points: &'static [(&'static str, Frame)],
+        read: fn(&Stated<'_>) -> Result<SetUp, KeyFault>,
     ) -> Entry {
         Entry {
             kind,
@@ -77,8 +81,23 @@ impl Entry {
             default_errors: default_errors::none,
             spindle_setup: None,
             keys,
+            points,
             read,
         }
+    }
+
+    /// The schemas of the keys of a test that only some instruments have.
+    pub fn keys(&self) -> serde_json::Map<String, serde_json::Value> {
+        let frames = self.points.iter().map(|(name, _)| (format!("{name}{}", set_up::FRAME), set_up::frame_schema()));
+        (self.keys)().into_iter().chain(frames).collect()
+    }
+
+    /// The set-up of a test, whose lengths may be expressions in the constants.
+    ///
+    /// # Errors
+    /// What is wrong with a key.
+    pub fn set_up(&self, keys: &Node, constants: &[Constant], machine: &Machine) -> Result<SetUp, KeyFault> {
+        (self.read)(&Stated::new(self.points, keys, constants, machine)?)
     }
 }
 
@@ -91,9 +110,7 @@ pub trait Geometry<N> {
     /// The reading; see [`Station::read`].
     fn reading<S: Scalar<Nominal = N>>(
         &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
+        at: MachineState<'_, S>,
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Reading<S>
     where
@@ -113,15 +130,15 @@ pub trait Geometry<N> {
 pub struct InstrumentPoint<'a, N> {
     /// What is there, in words.
     pub name: &'static str,
-    /// In its frame, mm.
-    pub mm: &'a [N; 3],
+    /// Where it is.
+    pub target: &'a Target<N>,
     /// The first of its three parameters among those of the instrument.
     pub first: usize,
 }
 
 impl<'a, N> InstrumentPoint<'a, N> {
-    pub(super) const fn of(name: &'static str, mm: &'a [N; 3], first: usize) -> Option<InstrumentPoint<'a, N>> {
-        Some(InstrumentPoint { name, mm, first })
+    pub(super) const fn of(name: &'static str, target: &'a Target<N>, first: usize) -> Option<Self> {
+        Some(InstrumentPoint { name, target, first })
     }
 }
 
@@ -140,7 +157,7 @@ impl Group<'_> {
     /// The nominal position of the instrument's tool-frame point in R, at every row of all tests.
     pub(super) fn tool_points(&self) -> Vec<Vector3<f64>> {
         let of = |(station, readings): &(&Station<f64>, &Readings)| {
-            readings.nominal_points(self.machine, station.tool_point_mm())
+            readings.nominal_points(self.machine, &station.tool_point())
         };
         self.tests.iter().flat_map(of).collect()
     }
@@ -174,7 +191,8 @@ impl Checked<'_> {
         let mut state = Vec::new();
         (0..self.readings.rows()).map(move |row| {
             self.readings.state(self.machine, row, &mut state);
-            geometry.reading::<f64>(self.machine, &state, &none, |_| None)
+            let at = MachineState { machine: self.machine, state: &state, errors: &none };
+            geometry.reading::<f64>(at, |_| None)
         })
     }
 
@@ -328,10 +346,6 @@ pub trait Instrument {
         let _ = (machine, readings);
         None
     }
-    /// The points on the table and in the spindle, if the set-up states two balls.
-    fn balls_mut(&mut self) -> Option<[&mut [f64; 3]; 2]> {
-        None
-    }
     /// The direction in R along which, or about which, its first channel reads the positioning of an axis, and the body
     /// that it reads, if it does.
     fn positioning(&self) -> Option<([f64; 3], Body)> {
@@ -343,7 +357,7 @@ pub trait Instrument {
         false
     }
     /// Its point on the table and its point on the tool, if they are its own.
-    fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
+    fn points_mut(&mut self) -> [Option<&mut Target<f64>>; 2] {
         [None, None]
     }
     /// Checks that the instrument nominally fits at the positions of the readings.

@@ -21,51 +21,51 @@ use super::column::{Column, Quantity};
 use super::check::{self, MAX_MM};
 use super::kind::Checked;
 use super::operation::direction_in_words;
-use super::set_up::{self, SetUp, Written};
+use super::set_up::{self, SetUp, Stated, Written};
 use super::{Aligned, Travel, 
-    Entry, Fault, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
-    displaced, point,
+    Entry, Fault, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station, Target,
+    point,
 };
 use crate::median::median;
 use crate::axis::AxisKind;
-use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::chain::{AxisPosition, BodyErrors, Frame, Machine, MachineState};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
 use crate::frames::{Point, cross, dot, dot_nominal};
 use crate::rotation_error::Body;
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
-use crate::session::expression::Constant;
 use crate::session::readings::Readings;
 use crate::unit::Unit;
 
 /// Reflector, optic, the beam's deviation, the zero of each channel.
-pub const PARAMETERS: [InstrumentParameter; 14] = [
-    InstrumentParameter::length("reflector", "x", SharedBy::SpindleSetup),
-    InstrumentParameter::length("reflector", "y", SharedBy::SpindleSetup),
-    InstrumentParameter::length("reflector", "z", SharedBy::SpindleSetup),
-    InstrumentParameter::length("optic", "x", SharedBy::Setup),
-    InstrumentParameter::length("optic", "y", SharedBy::Setup),
-    InstrumentParameter::length("optic", "z", SharedBy::Setup),
-    InstrumentParameter::angle("beam", "horizontal", SharedBy::Setup),
-    InstrumentParameter::angle("beam", "vertical", SharedBy::Setup),
-    InstrumentParameter::length("zero", "displacement", SharedBy::Setup),
-    InstrumentParameter::length("zero", "horizontal", SharedBy::Setup),
-    InstrumentParameter::length("zero", "vertical", SharedBy::Setup),
-    InstrumentParameter::angle("zero", "pitch", SharedBy::Setup),
-    InstrumentParameter::angle("zero", "yaw", SharedBy::Setup),
-    InstrumentParameter::angle("zero", "roll", SharedBy::Setup),
-];
+pub const PARAMETERS: [InstrumentParameter; 14] = InstrumentParameter::all(&[
+    &InstrumentParameter::point("reflector", SharedBy::SpindleSetup),
+    &InstrumentParameter::point("optic", SharedBy::Setup),
+    &[
+        InstrumentParameter::angle("beam", "horizontal", SharedBy::Setup),
+        InstrumentParameter::angle("beam", "vertical", SharedBy::Setup),
+        InstrumentParameter::length("zero", "displacement", SharedBy::Setup),
+        InstrumentParameter::length("zero", "horizontal", SharedBy::Setup),
+        InstrumentParameter::length("zero", "vertical", SharedBy::Setup),
+        InstrumentParameter::angle("zero", "pitch", SharedBy::Setup),
+        InstrumentParameter::angle("zero", "yaw", SharedBy::Setup),
+        InstrumentParameter::angle("zero", "roll", SharedBy::Setup),
+    ],
+]);
 
 const OPTIC: usize = 3;
 const BEAM: usize = 6;
 const ZERO: usize = 8;
 
+/// The points on bodies, that of the table first.
+const POINTS: &[(&str, Frame)] = &[("optic", Frame::Table), ("reflector", Frame::Tool)];
+
 pub(super) const ENTRY: Entry = Entry {
     is_two_sided: true,
     rows_can_lack_channels: true,
     needs_every_axis: false,
-    ..Entry::new(InstrumentKind::Laser, ["laser", "a laser interferometer"], &PARAMETERS, schema::properties::<Keys>, read)
+    ..Entry::new(InstrumentKind::Laser, ["laser", "a laser interferometer"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
 };
 
 /// The channels in the order of their zeros.
@@ -138,14 +138,10 @@ impl Word {
     const ALL: [Word; 6] = [Word::Displacement, Word::Horizontal, Word::Vertical, Word::Pitch, Word::Yaw, Word::Roll];
 }
 
-fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
-    let keys: Keys = set_up::keys(set_up)?;
-    let at = |key: &str, given: &Option<document::Point>| match given {
-        Some(given) => set_up::point(key, given, constants),
-        None => Ok([0.0; 3].map(Written::number)),
-    };
-    let reflector = at("reflector_mm", &keys.reflector_mm)?;
-    let optic = at("optic_mm", &keys.optic_mm)?;
+fn read(set_up: &Stated<'_>) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up.keys()?;
+    let reflector = set_up.point("reflector", &keys.reflector_mm)?;
+    let optic = set_up.point("optic", &keys.optic_mm)?;
     let frame = frame(keys.beam.0).map(|direction| direction.map(Written::number));
     let mut channels: Vec<usize> = match &keys.channels {
         Some(words) if words.is_empty() => {
@@ -192,7 +188,7 @@ impl Laser<f64> {
     /// Adds the nominal reading of each straightness, times a factor.
     fn add_nominal(&self, machine: &Machine, state: &[AxisPosition<f64>], factor: f64, values: &mut [f64]) {
         let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
-        let nominal = self.reading::<f64>(machine, state, &none, |_| None);
+        let nominal = self.reading::<f64>(MachineState { machine, state, errors: &none }, |_| None);
         let read = places(&self.channels).zip(values).zip(nominal.channels());
         let straightness = read.filter(|((place, _), _)| STRAIGHTNESS.contains(place));
         straightness.for_each(|((_, value), nominal)| *value += factor * nominal);
@@ -229,10 +225,10 @@ fn frame(beam: [f64; 3]) -> [[f64; 3]; 3] {
 /// A laser as set up for one test, lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Laser<N> {
-    /// The reflector in the tool frame.
-    pub reflector: [N; 3],
-    /// The other optic in the table frame.
-    pub optic: [N; 3],
+    /// The reflector.
+    pub reflector: Target<N>,
+    /// The other optic.
+    pub optic: Target<N>,
     /// Beam, horizontal and vertical in R, of unit length.
     pub frame: [[N; 3]; 3],
     /// The channels that are read, in the order of their zeros.
@@ -248,8 +244,8 @@ impl<N> Geometry<N> for Laser<N> {
 
     fn map<M>(&self, to: &impl Fn(&N) -> M) -> Laser<M> {
         Laser {
-            reflector: point(&self.reflector, to),
-            optic: point(&self.optic, to),
+            reflector: self.reflector.map(to),
+            optic: self.optic.map(to),
             frame: self.frame.each_ref().map(|direction| point(direction, to)),
             channels: self.channels.clone(),
             is_beam_stated: self.is_beam_stated,
@@ -268,20 +264,19 @@ impl<N> Geometry<N> for Laser<N> {
     /// The channels, mm or rad.
     fn reading<S: Scalar<Nominal = N>>(
         &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
+        at: MachineState<'_, S>,
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Reading<S>
     where
         N: Nominal,
     {
         let reads = |channels: std::ops::Range<usize>| places(&self.channels).any(|place| channels.contains(&place));
-        let optic = || machine.workpiece_point(state, errors, displaced(self.optic, OPTIC, &unknown));
         let from_optic = reads(0..3).then(|| {
-            machine.tool_point(state, errors, displaced(self.reflector, 0, &unknown)).minus(optic())
+            let reflector = self.reflector.in_r(at, 0, &unknown);
+            reflector.minus(self.optic.in_r(at, OPTIC, &unknown))
         });
-        let rotation = reads(3..6).then(|| machine.rotation_error(state, errors, Body::Relative));
+        let frames = [self.reflector.frame, self.optic.frame];
+        let rotation = reads(3..6).then(|| at.machine.rotation_error(at.state, at.errors, frames));
         let frame = beam_frame(self.frame, unknown(BEAM), unknown(BEAM + 1));
         Reading::of(places(&self.channels).map(|channel| {
             let value = match (channel, &from_optic, &rotation, &frame) {
@@ -342,9 +337,9 @@ impl Instrument for Laser<f64> {
         let point = |point: [f64; 3]| (point != [0.0; 3]).then(|| set_up::written_point(point));
         let words = places(&self.channels).filter_map(|place| Word::ALL.get(place).copied());
         let keys = Keys {
-            reflector_mm: point(self.reflector),
+            reflector_mm: point(self.reflector.mm),
             reflector_u_um: set_up::written_lengths(priors, 0),
-            optic_mm: point(self.optic),
+            optic_mm: point(self.optic.mm),
             optic_u_um: set_up::written_lengths(priors, OPTIC),
             beam: set_up::written_direction(self.frame[0]),
             beam_u_arcsec: None,
@@ -368,7 +363,7 @@ impl Instrument for Laser<f64> {
             ..Handling::default()
         }
     }
-    fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
+    fn points_mut(&mut self) -> [Option<&mut Target<f64>>; 2] {
         [Some(&mut self.optic), Some(&mut self.reflector)]
     }
     fn channels(&self) -> &[Channel] {

@@ -11,10 +11,12 @@ mod operation;
 mod parameter;
 pub mod set_up;
 pub mod stand;
+mod target;
 
 pub use kind::{Checked, Entry, Fault, Geometry, Group, Instrument, InstrumentPoint, Misreading, MisreadingKind};
 pub use operation::{Aligned, Contact, Following, Handling, Travel};
 pub use parameter::{InstrumentParameter, SharedBy};
+pub use target::Target;
 
 use std::ops::{Deref, DerefMut};
 use std::str::FromStr;
@@ -22,9 +24,8 @@ use std::str::FromStr;
 use column::Quantity;
 
 use crate::Diagnostic;
-use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::chain::{AxisPosition, BodyErrors, Frame, Machine, MachineState};
 use crate::component::ErrorName;
-use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
 use crate::words::listed;
 
@@ -84,8 +85,9 @@ macro_rules! instruments {
             where
                 N: Nominal,
             {
+                let at = MachineState { machine, state, errors };
                 match self {
-                    $(Station::$kind(geometry) => geometry.reading(machine, state, errors, unknown),)+
+                    $(Station::$kind(geometry) => geometry.reading(at, unknown),)+
                 }
             }
 
@@ -196,19 +198,20 @@ impl<N> Station<N> {
     /// A reading that all errors of the machine affect, from a point of the table to a point of the tool, mm: for what is
     /// computed without an instrument.
     pub fn between(table_mm: [N; 3], tool_mm: [N; 3], apart_mm: N) -> Station<N> {
-        Station::BallBar(ballbar::BallBar { workpiece_ball: table_mm, spindle_ball: tool_mm, bar: apart_mm })
+        let (workpiece_ball, spindle_ball) = (Target::on_table(table_mm), Target::on_tool(tool_mm));
+        Station::BallBar(ballbar::BallBar { workpiece_ball, spindle_ball, bar: apart_mm })
     }
 }
 
 impl<N: Nominal> Station<N> {
-    /// The instrument's point in the table frame, mm, if it has one.
-    pub fn table_point_mm(&self) -> Option<[N; 3]> {
-        self.points()[0].map(|point| *point.mm)
+    /// The instrument's point on the side of the table, if it has one.
+    pub fn table_point(&self) -> Option<Target<N>> {
+        self.points()[0].map(|point| *point.target)
     }
 
-    /// The instrument's point in the tool frame, mm; its origin without one.
-    pub fn tool_point_mm(&self) -> [N; 3] {
-        self.points()[1].map_or([N::constant(0.0); 3], |point| *point.mm)
+    /// The instrument's point on the side of the tool; the origin of the tool frame without one.
+    pub fn tool_point(&self) -> Target<N> {
+        self.points()[1].map_or(Target::on_tool([N::constant(0.0); 3]), |point| *point.target)
     }
 }
 
@@ -255,13 +258,27 @@ impl Station<f64> {
         }
     }
 
-    /// Nominal position of the object that a group of tests shares, mm.
-    pub fn shared_mm(&self, group: SharedBy) -> [f64; 3] {
+    /// The object that a group of tests shares, where it nominally is; a bar by its length.
+    pub fn shared(&self, group: SharedBy) -> Target<f64> {
         match group {
-            SharedBy::Setup => self.table_point_mm().unwrap_or([0.0; 3]),
-            SharedBy::BarSetup => [self.reference_mm(), 0.0, 0.0],
-            _ => self.tool_point_mm(),
+            SharedBy::Setup => self.table_point().unwrap_or(Target::on_table([0.0; 3])),
+            SharedBy::BarSetup => Target::on_table([self.reference_mm(), 0.0, 0.0]),
+            _ => self.tool_point(),
         }
+    }
+
+    /// The points of table and tool as the ends of a bar; `None` without a point of the table.
+    pub fn between_points(&self) -> Option<ballbar::BallBar<f64>> {
+        let (workpiece_ball, spindle_ball) = (self.table_point()?, self.tool_point());
+        Some(ballbar::BallBar { workpiece_ball, spindle_ball, bar: self.reference_mm() })
+    }
+
+    /// The points that are not fixed on their default bodies: the key of each, and its frame.
+    pub fn frames(&self) -> impl Iterator<Item = (String, Frame)> {
+        let (defaults, mut own) = (self.kind().entry().points.iter(), self.clone());
+        let frames: Vec<Frame> = own.points_mut().into_iter().flatten().map(|target| target.frame).collect();
+        let others = defaults.zip(frames).filter(|((_, default), frame)| default != frame);
+        others.map(|((name, _), frame)| (format!("{name}{}", set_up::FRAME), frame))
     }
 }
 
@@ -300,12 +317,4 @@ impl<S: Scalar> Reading<S> {
 /// Converts the coordinates of a nominal point.
 fn point<N, M>(point: &[N; 3], to: &impl Fn(&N) -> M) -> [M; 3] {
     point.each_ref().map(to)
-}
-
-/// A nominal point, displaced by three parameters if they are included.
-pub fn displaced<S: Scalar>(nominal: [S::Nominal; 3], first: usize, unknown: &impl Fn(usize) -> Option<S>) -> Point<S> {
-    Point(std::array::from_fn(|i| match unknown(first + i) {
-        Some(displacement) => displacement + nominal[i],
-        None => S::nominal(nominal[i]),
-    }))
 }

@@ -66,4 +66,37 @@ impl InstrumentParameter {
     ) -> InstrumentParameter {
         InstrumentParameter::new(thing, coordinate, InternalUnit::Radian, shared_by)
     }
+
+    /// Three coordinates of a point.
+    pub(super) const fn point(thing: &'static str, shared_by: SharedBy) -> [InstrumentParameter; 3] {
+        [
+            InstrumentParameter::length(thing, "x", shared_by),
+            InstrumentParameter::length(thing, "y", shared_by),
+            InstrumentParameter::length(thing, "z", shared_by),
+        ]
+    }
+
+    /// Three angles of a small rotation.
+    pub(super) const fn rotation(thing: &'static str, shared_by: SharedBy) -> [InstrumentParameter; 3] {
+        [
+            InstrumentParameter::angle(thing, "a", shared_by),
+            InstrumentParameter::angle(thing, "b", shared_by),
+            InstrumentParameter::angle(thing, "c", shared_by),
+        ]
+    }
+
+    /// The parameters of several objects, one after the other.
+    pub(super) const fn all<const COUNT: usize>(objects: &[&[InstrumentParameter]]) -> [InstrumentParameter; COUNT] {
+        let (mut all, mut count, mut object) = ([objects[0][0]; COUNT], 0, 0);
+        while object < objects.len() {
+            let mut place = 0;
+            while place < objects[object].len() {
+                all[count] = objects[object][place];
+                (count, place) = (count + 1, place + 1);
+            }
+            object += 1;
+        }
+        assert!(count == COUNT);
+        all
+    }
 }

@@ -12,21 +12,20 @@ use super::bearing::{Sight, bearings, direction, observed_bearings};
 use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::kind::{Checked, Group};
-use super::set_up::{self, SetUp, Written};
+use super::set_up::{self, SetUp, Stated, Written};
 use super::{Aligned, Travel, 
     Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
     default_errors, point,
 };
 use crate::median::median;
 use crate::axis::AxisKind;
-use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::chain::{AxisPosition, BodyErrors, Frame, Machine, MachineState};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
 use crate::frames::{Point, cross, dot};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
 use crate::session::readings::Readings;
-use crate::session::expression::Constant;
 use crate::unit::Unit;
 
 /// The direction of the line of sight: across and up.
@@ -40,7 +39,7 @@ pub(super) const ENTRY: Entry = Entry {
     default_errors: default_errors::orientations,
     // The line of sight stays from night to night.
     spindle_setup: Some("tool"),
-    ..Entry::new(InstrumentKind::Pointing, ["pointing", "observed directions"], &PARAMETERS, schema::properties::<Keys>, read)
+    ..Entry::new(InstrumentKind::Pointing, ["pointing", "observed directions"], &PARAMETERS, schema::properties::<Keys>, &[], read)
 };
 
 /// The channels.
@@ -63,8 +62,8 @@ struct Keys {
     line_of_sight_u_arcsec: Option<document::Uncertainty>,
 }
 
-fn read(set_up: &Node, _: &[Constant]) -> Result<SetUp, KeyFault> {
-    let keys: Keys = set_up::keys(set_up)?;
+fn read(set_up: &Stated<'_>) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up.keys()?;
     let sight = Point(keys.line_of_sight.map_or([1.0, 0.0, 0.0], |sight| sight.0));
     let is_free = keys.line_of_sight_u_arcsec.is_none_or(|u| set_up::angle(u) == Prior::Free);
     let priors = match keys.line_of_sight_u_arcsec {
@@ -96,7 +95,7 @@ impl<N: Nominal> Pointing<N> {
     /// Line of sight, across and up of the commanded mount, in R.
     fn nominal<S: Scalar<Nominal = N>>(&self, machine: &Machine, state: &[AxisPosition<N>]) -> Sight<S> {
         let none = vec![BodyErrors::<S>::NONE; machine.axes.len()];
-        self.directions.map(|direction| machine.tool_direction(state, &none, Point::nominal(direction)))
+        self.directions.map(|direction| machine.direction_in_r(Frame::Tool, state, &none, Point::nominal(direction)))
     }
 }
 
@@ -112,21 +111,20 @@ impl<N> Geometry<N> for Pointing<N> {
     /// Across and up, rad.
     fn reading<S: Scalar<Nominal = N>>(
         &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
+        at: MachineState<'_, S>,
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Reading<S>
     where
         N: Nominal,
     {
+        let MachineState { machine, state, errors } = at;
         let mut sight = Point::nominal(self.directions[0]);
         for (parameter, direction) in self.directions[1..].iter().enumerate() {
             if let Some(angle) = unknown(parameter) {
                 sight = sight.plus(Point(direction.map(|x| angle * x)));
             }
         }
-        let sight = machine.tool_direction(state, errors, sight);
+        let sight = machine.direction_in_r(Frame::Tool, state, errors, sight);
         Reading::of(bearings(self.nominal::<S>(machine, state), sight))
     }
 }

@@ -18,43 +18,35 @@ use serde::{Deserialize, Serialize};
 
 use super::channel::Channel;
 use super::column::{Column, OF_ROTATION, Quantity};
-use super::set_up::{self, SetUp};
+use super::set_up::{self, SetUp, Stated};
 use super::stand::{self, Stand, pose_error};
 use super::{
     Aligned, Entry, Fault, Geometry, Group, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint,
-    Misreading, MisreadingKind, Reading, SharedBy, Station, Travel, default_errors, displaced, point,
+    Misreading, MisreadingKind, Reading, SharedBy, Station, Target, Travel, default_errors,
 };
-use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::chain::{AxisPosition, BodyErrors, Frame, Machine, MachineState};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
 use crate::frames::{Point, Rotation, SmallMotion};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
-use crate::session::expression::Constant;
 use crate::session::readings::Readings;
 use crate::unit::Unit;
 
-const POSE: [InstrumentParameter; 6] = stand::parameters("station");
-
 /// The pose of the instrument, then position and orientation of the target in the tool frame.
-pub const PARAMETERS: [InstrumentParameter; 12] = [
-    POSE[0],
-    POSE[1],
-    POSE[2],
-    POSE[3],
-    POSE[4],
-    POSE[5],
-    InstrumentParameter::length("target", "x", SharedBy::SpindleSetup),
-    InstrumentParameter::length("target", "y", SharedBy::SpindleSetup),
-    InstrumentParameter::length("target", "z", SharedBy::SpindleSetup),
-    InstrumentParameter::angle("target", "a", SharedBy::SpindleSetup),
-    InstrumentParameter::angle("target", "b", SharedBy::SpindleSetup),
-    InstrumentParameter::angle("target", "c", SharedBy::SpindleSetup),
-];
+pub const PARAMETERS: [InstrumentParameter; 12] = InstrumentParameter::all(&[
+    &InstrumentParameter::point("station", SharedBy::Setup),
+    &InstrumentParameter::rotation("station", SharedBy::Setup),
+    &InstrumentParameter::point("target", SharedBy::SpindleSetup),
+    &InstrumentParameter::rotation("target", SharedBy::SpindleSetup),
+]);
 
 /// The first parameters of position and orientation of the target.
 const TARGET: usize = 6;
 const ORIENTATION: usize = 9;
+
+/// The points on bodies, that of the table first.
+const POINTS: &[(&str, Frame)] = &[("target", Frame::Tool)];
 
 pub(super) const ENTRY: Entry = Entry {
     free: Some("station"),
@@ -66,6 +58,7 @@ pub(super) const ENTRY: Entry = Entry {
         ["pose", "poses of a body at the tool"],
         &PARAMETERS,
         schema::properties::<Keys>,
+        POINTS,
         read,
     )
 };
@@ -104,9 +97,9 @@ struct Keys {
     target_u_arcsec: document::Uncertainties,
 }
 
-fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
-    let keys: Keys = set_up::keys(set_up)?;
-    let target = set_up::point("target_mm", &keys.target_mm, constants)?;
+fn read(set_up: &Stated<'_>) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up.keys()?;
+    let target = set_up.point("target", &keys.target_mm)?;
     let orientation: Vec<Prior> = set_up::angles(&keys.target_u_arcsec).collect();
     let is_turned = orientation.iter().all(|prior| *prior == Prior::Free);
     let position = [Prior::Free; 6].into_iter().chain(set_up::lengths(&keys.target_u_um));
@@ -118,11 +111,11 @@ fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
 /// A body and the instrument that reads its pose, lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pose<N> {
-    /// The target in the tool frame.
-    pub target: [N; 3],
+    /// The target.
+    pub target: Target<N>,
     /// Where the instrument stands.
     pub stand: Stand<N>,
-    /// `H`, the orientation of the body in the tool frame, if no session knows it; `None` for that of the tool frame.
+    /// `H`, the orientation of the body in the frame of its target, if no session knows it; `None` for that of the frame.
     pub turn: Option<UnitQuaternion<f64>>,
 }
 
@@ -130,29 +123,27 @@ impl<N> Geometry<N> for Pose<N> {
     type Over<M> = Pose<M>;
 
     fn map<M>(&self, to: &impl Fn(&N) -> M) -> Pose<M> {
-        Pose { target: point(&self.target, to), stand: self.stand.map(to), turn: self.turn }
+        Pose { target: self.target.map(to), stand: self.stand.map(to), turn: self.turn }
     }
     /// Position, mm, and rotation in addition to the nominal orientation, rad, in the instrument's frame.
     fn reading<S: Scalar<Nominal = N>>(
         &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
+        at: MachineState<'_, S>,
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Reading<S>
     where
         N: Nominal,
     {
         let pose = pose_error(&unknown);
-        let target = machine.tool_point(state, errors, displaced(self.target, TARGET, &unknown));
+        let target = self.target.in_r(at, TARGET, &unknown);
         let target = self.stand.point(pose.map_or(target, |pose| pose.push(target)));
         let turned = |i: usize| unknown(ORIENTATION + i);
-        let in_tool = (0..3).any(|i| turned(i).is_some()).then(|| {
+        let in_frame = (0..3).any(|i| turned(i).is_some()).then(|| {
             let zero = S::constant(0.0);
             let [a, b, c] = std::array::from_fn(|i| turned(i).unwrap_or(zero));
             SmallMotion::new([zero, zero, zero, a, b, c], Rotation::Exact)
         });
-        let rotation = machine.rotation_error_of_body(state, errors, [in_tool.as_ref(), pose.as_ref()]);
+        let rotation = at.machine.rotation_error_of_body(at.state, at.errors, self.target.frame, [in_frame.as_ref(), pose.as_ref()]);
         Reading::of(target.0.into_iter().chain(self.stand.direction(rotation).0))
     }
     fn points(&self) -> [Option<InstrumentPoint<'_, N>>; 2] {
@@ -160,12 +151,12 @@ impl<N> Geometry<N> for Pose<N> {
     }
 }
 
-/// The commanded orientation of the tool frame in R.
-fn commanded(machine: &Machine, state: &[AxisPosition<f64>]) -> Matrix3<f64> {
+/// The commanded orientation of a frame in R.
+fn commanded(machine: &Machine, frame: Frame, state: &[AxisPosition<f64>]) -> Matrix3<f64> {
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let column = |k: usize| {
         let unit = Point(std::array::from_fn(|i| if i == k { 1.0 } else { 0.0 }));
-        Vector3::from(machine.tool_direction::<f64>(state, &none, unit).0)
+        Vector3::from(machine.direction_in_r::<f64>(frame, state, &none, unit).0)
     };
     Matrix3::from_columns(&[column(0), column(1), column(2)])
 }
@@ -294,18 +285,18 @@ fn axial(rotation: &Matrix3<f64>) -> Vector3<f64> {
 impl Pose<f64> {
     /// The nominal orientation of the body in the instrument's frame.
     fn nominal(&self, machine: &Machine, state: &[AxisPosition<f64>]) -> UnitQuaternion<f64> {
-        quaternion(self.stand.matrix() * commanded(machine, state)) * self.turn.unwrap_or_default()
+        quaternion(self.stand.matrix() * commanded(machine, self.target.frame, state)) * self.turn.unwrap_or_default()
     }
 }
 
-/// The commanded orientation of the tool frame in R and the measured one of the body, in the rows that have both.
-fn orientations(machine: &Machine, readings: &Readings) -> Vec<[Matrix3<f64>; 2]> {
+/// The commanded orientation of a frame in R and the measured one of the body, in the rows that have both.
+fn orientations(machine: &Machine, frame: Frame, readings: &Readings) -> Vec<[Matrix3<f64>; 2]> {
     let mut state = Vec::new();
     let mut pairs = Vec::with_capacity(readings.rows());
     for (row, values) in readings.observed.chunks_exact(CHANNELS.len()).enumerate() {
         if values[OF_ROTATION].iter().all(|value| value.is_finite()) {
             readings.state(machine, row, &mut state);
-            pairs.push([commanded(machine, &state), observed(values).to_rotation_matrix().into_inner()]);
+            pairs.push([commanded(machine, frame, &state), observed(values).to_rotation_matrix().into_inner()]);
         }
     }
     pairs
@@ -318,7 +309,7 @@ impl Instrument for Pose<f64> {
     }
     fn written(&self, priors: &[Prior]) -> Option<Node> {
         let keys = Keys {
-            target_mm: set_up::written_point(self.target),
+            target_mm: set_up::written_point(self.target.mm),
             target_u_um: set_up::written_lengths(priors, TARGET),
             target_u_arcsec: set_up::written_angles(priors, ORIENTATION),
         };
@@ -328,7 +319,7 @@ impl Instrument for Pose<f64> {
         let beside = "Measuring system, where it sees the target at every position: its place is estimated";
         Handling { beside: Some(beside.into()), ..Handling::default() }
     }
-    fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
+    fn points_mut(&mut self) -> [Option<&mut Target<f64>>; 2] {
         [None, Some(&mut self.target)]
     }
     fn channels(&self) -> &[Channel] {
@@ -383,7 +374,7 @@ impl Instrument for Pose<f64> {
             sum /= spread;
         }
         for (station, readings) in &group.tests {
-            let turns = orientations(group.machine, readings);
+            let turns = orientations(group.machine, self.target.frame, readings);
             let share = 1.0 / turns.len().max(1) as f64;
             let of_tool = matches!(station, Station::Pose(pose) if pose.turn.is_none());
             for [commanded, measured] in &turns {
@@ -402,7 +393,7 @@ impl Instrument for Pose<f64> {
         let mut sum = Matrix3::zeros();
         for (station, readings) in &group.tests {
             if let Station::Pose(Pose { stand, .. }) = station {
-                let turns = orientations(group.machine, readings);
+                let turns = orientations(group.machine, self.target.frame, readings);
                 sum += turns
                     .iter()
                     .map(|[of, measured]| (stand.matrix() * of).transpose() * measured)

@@ -18,35 +18,28 @@ use serde::{Deserialize, Serialize};
 use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::check::MAX_MM;
-use super::set_up::{self, SetUp, Written};
+use super::set_up::{self, SetUp, Stated, Written};
 use super::stand::pose_error;
 use super::{Contact, 
-    Checked, Entry, Fault, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
-    default_errors, displaced, point,
+    Checked, Entry, Fault, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station, Target,
+    default_errors, point,
 };
-use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::chain::{AxisPosition, Frame, Machine, MachineState};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
 use crate::frames::{Point, cross, dot};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
-use crate::session::expression::Constant;
 use crate::unit::Unit;
 
 /// The pose of the artefact on the table, its radius, its form deviation; the stylus in the tool frame.
-pub const PARAMETERS: [InstrumentParameter; 11] = [
-    InstrumentParameter::length("artefact", "x", SharedBy::Setup),
-    InstrumentParameter::length("artefact", "y", SharedBy::Setup),
-    InstrumentParameter::length("artefact", "z", SharedBy::Setup),
-    InstrumentParameter::angle("artefact", "a", SharedBy::Setup),
-    InstrumentParameter::angle("artefact", "b", SharedBy::Setup),
-    InstrumentParameter::angle("artefact", "c", SharedBy::Setup),
-    InstrumentParameter::length("radius", "", SharedBy::Setup),
-    InstrumentParameter::length("form", "", SharedBy::Setup),
-    InstrumentParameter::length("stylus", "x", SharedBy::SpindleSetup),
-    InstrumentParameter::length("stylus", "y", SharedBy::SpindleSetup),
-    InstrumentParameter::length("stylus", "z", SharedBy::SpindleSetup),
-];
+pub const PARAMETERS: [InstrumentParameter; 11] = InstrumentParameter::all(&[
+    &InstrumentParameter::point("artefact", SharedBy::Setup),
+    &InstrumentParameter::rotation("artefact", SharedBy::Setup),
+    &[InstrumentParameter::length("radius", "", SharedBy::Setup)],
+    &[InstrumentParameter::length("form", "", SharedBy::Setup)],
+    &InstrumentParameter::point("stylus", SharedBy::SpindleSetup),
+]);
 
 /// Index of the radius of the artefact in [`PARAMETERS`].
 pub const RADIUS: usize = 6;
@@ -55,10 +48,13 @@ pub const FORM: usize = 7;
 /// Index of the first stylus coordinate in [`PARAMETERS`].
 pub const STYLUS: usize = 8;
 
+/// The points on bodies, that of the table first.
+const POINTS: &[(&str, Frame)] = &[("artefact", Frame::Table), ("stylus", Frame::Tool)];
+
 pub(super) const ENTRY: Entry = Entry {
     is_two_sided: true,
     default_errors: default_errors::positions_and_orientations,
-    ..Entry::new(InstrumentKind::Probe, ["probe", "a touch probe"], &PARAMETERS, schema::properties::<Keys>, read)
+    ..Entry::new(InstrumentKind::Probe, ["probe", "a touch probe"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
 };
 
 /// The channels.
@@ -93,11 +89,11 @@ struct Keys {
     direction: Option<document::Direction>,
 }
 
-fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
-    let keys: Keys = set_up::keys(set_up)?;
-    let artefact = set_up::point("artefact_mm", &keys.artefact_mm, constants)?;
-    let radius = set_up::positive("radius_mm", &keys.radius_mm, constants)?;
-    let stylus = set_up::point("stylus_mm", &keys.stylus_mm, constants)?;
+fn read(set_up: &Stated<'_>) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up.keys()?;
+    let artefact = set_up.point("artefact", &keys.artefact_mm)?;
+    let radius = set_up.positive("radius_mm", &keys.radius_mm)?;
+    let stylus = set_up.point("stylus", &keys.stylus_mm)?;
     let axis = keys.artefact_axis.map_or([0.0, 0.0, 1.0], |axis| axis.0).map(Written::number);
     let direction = keys.direction.map(|direction| direction.0.map(Written::number));
     let artefact_priors = set_up::lengths(&keys.artefact_u_um).chain(set_up::angles(&keys.artefact_u_arcsec));
@@ -110,14 +106,14 @@ fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
 /// A probe and a cylindrical artefact as set up for one test, lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Probe<N> {
-    /// A point of the cylinder's axis in the table frame.
-    pub artefact: [N; 3],
-    /// Direction of the cylinder's axis in the table frame, of unit length.
+    /// A point of the cylinder's axis.
+    pub artefact: Target<N>,
+    /// Direction of the cylinder's axis in the frame of that point, of unit length.
     pub axis: [N; 3],
     /// Radius of the surface on which the stylus centre moves: the sum of the radii of artefact and stylus.
     pub radius: N,
-    /// Centre of the stylus in the tool frame.
-    pub stylus: [N; 3],
+    /// Centre of the stylus.
+    pub stylus: Target<N>,
     /// Probing direction in R, of unit length; `None` for straight towards the cylinder's nominal axis.
     pub direction: Option<[N; 3]>,
 }
@@ -164,11 +160,10 @@ impl<N: Nominal> Probe<N> {
         if let Some(direction) = self.direction {
             return (Point::nominal(direction), None);
         }
-        let none = vec![BodyErrors::<S>::NONE; machine.axes.len()];
-        let stylus = machine.tool_point(state, &none, Point::nominal(self.stylus));
-        let foot = machine.workpiece_point(state, &none, Point::nominal(self.artefact));
-        let tip: [N; 3] = std::array::from_fn(|i| self.artefact[i] + self.axis[i]);
-        let along = machine.workpiece_point(state, &none, Point::nominal(tip)).minus(foot);
+        let stylus = self.stylus.nominal_in_r::<S>(machine, state);
+        let foot = self.artefact.nominal_in_r(machine, state);
+        let tip = Target { mm: std::array::from_fn(|i| self.artefact.mm[i] + self.axis[i]), ..self.artefact };
+        let along = tip.nominal_in_r(machine, state).minus(foot);
         let inward = perpendicular(foot.minus(stylus), along);
         (inward, Some(inward.norm()))
     }
@@ -184,16 +179,14 @@ impl<N: Nominal> Probe<N> {
     /// Stylus and probing direction in the frame of the artefact.
     pub fn geometry<S: Scalar<Nominal = N>>(
         &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
+        at: MachineState<'_, S>,
         unknown: impl Fn(usize) -> Option<S>,
     ) -> ProbeGeometry<S> {
-        let stylus = machine.tool_point(state, errors, displaced(self.stylus, STYLUS, &unknown));
-        let (step, step_length) = self.step_at(machine, state);
-        let ahead = machine.table_point(state, errors, stylus.plus(step));
-        let stylus = machine.table_point(state, errors, stylus);
-        let mut from_artefact = stylus.minus(Point::nominal(self.artefact));
+        let stylus = self.stylus.in_r(at, STYLUS, &unknown);
+        let (step, step_length) = self.step_at(at.machine, at.state);
+        let ahead = at.in_frame(self.artefact.frame, stylus.plus(step));
+        let stylus = at.in_frame(self.artefact.frame, stylus);
+        let mut from_artefact = stylus.minus(Point::nominal(self.artefact.mm));
         let mut direction = ahead.minus(stylus);
         if let Some(pose) = pose_error(&unknown) {
             from_artefact = pose.pull(from_artefact);
@@ -220,25 +213,23 @@ impl<N> Geometry<N> for Probe<N> {
 
     fn map<M>(&self, to: &impl Fn(&N) -> M) -> Probe<M> {
         Probe {
-            artefact: point(&self.artefact, to),
+            artefact: self.artefact.map(to),
             axis: point(&self.axis, to),
             radius: to(&self.radius),
-            stylus: point(&self.stylus, to),
+            stylus: self.stylus.map(to),
             direction: self.direction.as_ref().map(|direction| point(direction, to)),
         }
     }
     /// The reading: the signed distance to the surface, mm. NaN if the line misses the artefact.
     fn reading<S: Scalar<Nominal = N>>(
         &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
+        at: MachineState<'_, S>,
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Reading<S>
     where
         N: Nominal,
     {
-        Reading::scalar(self.geometry(machine, state, errors, unknown).distance())
+        Reading::scalar(self.geometry(at, unknown).distance())
     }
     fn points(&self) -> [Option<InstrumentPoint<'_, N>>; 2] {
         [InstrumentPoint::of("artefact", &self.artefact, 0), InstrumentPoint::of("stylus", &self.stylus, STYLUS)]
@@ -259,13 +250,13 @@ impl Instrument for Probe<f64> {
     }
     fn written(&self, priors: &[Prior]) -> Option<Node> {
         let keys = Keys {
-            artefact_mm: set_up::written_point(self.artefact),
+            artefact_mm: set_up::written_point(self.artefact.mm),
             artefact_u_um: set_up::written_lengths(priors, 0),
             artefact_u_arcsec: set_up::written_angles(priors, 3),
             artefact_axis: (self.axis != [0.0, 0.0, 1.0]).then(|| set_up::written_direction(self.axis)),
             radius_mm: set_up::rounded(self.radius).into(),
             radius_u_um: set_up::written_u(priors.get(RADIUS), Unit::Micrometre),
-            stylus_mm: set_up::written_point(self.stylus),
+            stylus_mm: set_up::written_point(self.stylus.mm),
             stylus_u_um: set_up::written_lengths(priors, STYLUS),
             direction: self.direction.map(set_up::written_direction),
         };
@@ -282,7 +273,7 @@ impl Instrument for Probe<f64> {
     fn contact(&self) -> Contact {
         Contact::Touching
     }
-    fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
+    fn points_mut(&mut self) -> [Option<&mut Target<f64>>; 2] {
         [Some(&mut self.artefact), Some(&mut self.stylus)]
     }
     fn channels(&self) -> &[Channel] {

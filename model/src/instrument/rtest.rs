@@ -20,41 +20,41 @@ use serde::{Deserialize, Serialize, Serializer};
 use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::check::MAX_MM;
-use super::set_up::{self, SetUp, Written};
+use super::set_up::{self, SetUp, Stated, Written};
 use super::{Contact, 
     Checked, Entry, Fault, Following, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Misreading, Reading, SharedBy,
-    Station, default_errors, displaced, point,
+    Station, Target, default_errors, point,
 };
 use crate::median::median;
-use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::chain::{Frame, MachineState};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
 use crate::frames::{Coordinate, Point, Rotation, SinCos, cross, turn_about};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
-use crate::session::expression::Constant;
 use crate::unit::Unit;
 
 /// Both points, then ω₁, φ₁ and θ₁ of the nest.
-pub const PARAMETERS: [InstrumentParameter; 9] = [
-    InstrumentParameter::length("workpiece_ball", "x", SharedBy::Setup),
-    InstrumentParameter::length("workpiece_ball", "y", SharedBy::Setup),
-    InstrumentParameter::length("workpiece_ball", "z", SharedBy::Setup),
-    InstrumentParameter::length("spindle_ball", "x", SharedBy::SpindleSetup),
-    InstrumentParameter::length("spindle_ball", "y", SharedBy::SpindleSetup),
-    InstrumentParameter::length("spindle_ball", "z", SharedBy::SpindleSetup),
-    InstrumentParameter::angle("sensor", "omega", SharedBy::Sensors),
-    InstrumentParameter::angle("sensor", "phi", SharedBy::Sensors),
-    InstrumentParameter::angle("sensor", "theta", SharedBy::Sensors),
-];
+pub const PARAMETERS: [InstrumentParameter; 9] = InstrumentParameter::all(&[
+    &InstrumentParameter::point("workpiece_ball", SharedBy::Setup),
+    &InstrumentParameter::point("spindle_ball", SharedBy::SpindleSetup),
+    &[
+        InstrumentParameter::angle("sensor", "omega", SharedBy::Sensors),
+        InstrumentParameter::angle("sensor", "phi", SharedBy::Sensors),
+        InstrumentParameter::angle("sensor", "theta", SharedBy::Sensors),
+    ],
+]);
 
 /// Index of ω₁ in [`PARAMETERS`].
 pub const SENSOR: usize = 6;
 
+/// The points on bodies, that of the table first.
+const POINTS: &[(&str, Frame)] = &[("workpiece_ball", Frame::Table), ("spindle_ball", Frame::Tool)];
+
 pub(super) const ENTRY: Entry = Entry {
     is_two_sided: true,
     default_errors: default_errors::positions_and_orientations,
-    ..Entry::new(InstrumentKind::RTest, ["r-test", "an R-test"], &PARAMETERS, schema::properties::<Keys>, read)
+    ..Entry::new(InstrumentKind::RTest, ["r-test", "an R-test"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
 };
 
 /// The channels.
@@ -116,10 +116,10 @@ impl document::Coordinate for Degrees {
     const THREE: &'static str = "the three angles ω, φ, θ";
 }
 
-fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
-    let keys: Keys = set_up::keys(set_up)?;
-    let workpiece_ball = set_up::point("workpiece_ball_mm", &keys.workpiece_ball_mm, constants)?;
-    let spindle_ball = set_up::point("spindle_ball_mm", &keys.spindle_ball_mm, constants)?;
+fn read(set_up: &Stated<'_>) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up.keys()?;
+    let workpiece_ball = set_up.point("workpiece_ball", &keys.workpiece_ball_mm)?;
+    let spindle_ball = set_up.point("spindle_ball", &keys.spindle_ball_mm)?;
     let sensors = read_sensors(&keys)?.map(|rows| rows.map(|row| row.map(Written::number)));
     let balls = set_up::lengths(&keys.workpiece_ball_u_um).chain(set_up::lengths(&keys.spindle_ball_u_um));
     let priors = balls.chain(set_up::angles(&keys.sensor_u_arcsec)).collect();
@@ -195,10 +195,10 @@ impl TryFrom<String> for Setting {
 pub struct RTest<N> {
     /// The body that carries the sensors.
     pub setting: Setting,
-    /// The point on the table, in the table frame: the centre of the nest in E, of the master ball in Es.
-    pub workpiece_ball: [N; 3],
-    /// The point in the spindle, in the tool frame: the centre of the master ball in E, of the nest in Es.
-    pub spindle_ball: [N; 3],
+    /// The point on the table: the centre of the nest in E, of the master ball in Es.
+    pub workpiece_ball: Target<N>,
+    /// The point in the spindle: the centre of the master ball in E, of the nest in Es.
+    pub spindle_ball: Target<N>,
     /// The measuring direction of each sensor in the carrying frame, row by row; `None` if readings are in that frame.
     pub sensors: Option<[[N; 3]; 3]>,
 }
@@ -262,21 +262,18 @@ impl<N: Nominal> RTest<N> {
     /// `P_s − P_w` in the frame that carries the sensors, mm.
     pub fn difference<S: Scalar<Nominal = N>>(
         &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
+        at: MachineState<'_, S>,
         unknown: &impl Fn(usize) -> Option<S>,
     ) -> Point<S> {
-        let workpiece = displaced(self.workpiece_ball, 0, unknown);
-        let spindle = displaced(self.spindle_ball, 3, unknown);
+        let (table, spindle) = (&self.workpiece_ball, &self.spindle_ball);
         match self.setting {
             Setting::Table => {
-                let ball = machine.tool_point(state, errors, spindle);
-                machine.table_point(state, errors, ball).minus(workpiece)
+                let ball = spindle.in_r(at, 3, unknown);
+                at.in_frame(table.frame, ball).minus(table.displaced(0, unknown))
             }
             Setting::Spindle => {
-                let ball = machine.workpiece_point(state, errors, workpiece);
-                spindle.minus(machine.spindle_point(state, errors, ball))
+                let ball = table.in_r(at, 0, unknown);
+                spindle.displaced(3, unknown).minus(at.in_frame(spindle.frame, ball))
             }
         }
     }
@@ -288,27 +285,25 @@ impl<N> Geometry<N> for RTest<N> {
     fn map<M>(&self, to: &impl Fn(&N) -> M) -> RTest<M> {
         RTest {
             setting: self.setting,
-            workpiece_ball: point(&self.workpiece_ball, to),
-            spindle_ball: point(&self.spindle_ball, to),
+            workpiece_ball: self.workpiece_ball.map(to),
+            spindle_ball: self.spindle_ball.map(to),
             sensors: self.sensors.as_ref().map(|rows| rows.each_ref().map(|row| point(row, to))),
         }
     }
     /// The reading: the three sensor values, or the vector in the carrying frame, mm.
     fn reading<S: Scalar<Nominal = N>>(
         &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
+        at: MachineState<'_, S>,
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Reading<S>
     where
         N: Nominal,
     {
-        let mut vector = self.difference(machine, state, errors, &unknown);
+        let mut vector = self.difference(at, &unknown);
         let carried = (SENSOR..SENSOR + 3).any(|index| unknown(index).is_some());
         if carried {
             let angles = std::array::from_fn(|i| unknown(SENSOR + i).unwrap_or_else(|| S::constant(0.0)));
-            vector = Orientation::new(angles, machine.rotation).to_sensors(vector);
+            vector = Orientation::new(angles, at.machine.rotation).to_sensors(vector);
         }
         let Some(sensors) = &self.sensors else {
             return Reading::of(vector.0);
@@ -329,6 +324,14 @@ impl<N> Geometry<N> for RTest<N> {
 }
 
 impl RTest<f64> {
+    /// The point of the body that carries the sensors.
+    pub fn nest(&self) -> &Target<f64> {
+        match self.setting {
+            Setting::Table => &self.workpiece_ball,
+            Setting::Spindle => &self.spindle_ball,
+        }
+    }
+
     fn columns_help(&self) -> &'static str {
         if self.sensors.is_some() {
             "the test states the sensor directions: it needs the sensor values `du_um`, `dv_um` and `dw_um`; without \
@@ -348,9 +351,9 @@ impl Instrument for RTest<f64> {
     fn written(&self, priors: &[Prior]) -> Option<Node> {
         let keys = Keys {
             setting: self.setting,
-            workpiece_ball_mm: set_up::written_point(self.workpiece_ball),
+            workpiece_ball_mm: set_up::written_point(self.workpiece_ball.mm),
             workpiece_ball_u_um: set_up::written_lengths(priors, 0),
-            spindle_ball_mm: set_up::written_point(self.spindle_ball),
+            spindle_ball_mm: set_up::written_point(self.spindle_ball.mm),
             spindle_ball_u_um: set_up::written_lengths(priors, 3),
             sensor_angles_deg: None,
             sensor_directions: self.sensors.map(|rows| document::Three(rows.map(set_up::written_direction))),
@@ -370,7 +373,7 @@ impl Instrument for RTest<f64> {
     fn contact(&self) -> Contact {
         Contact::AtDistance(0.0)
     }
-    fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
+    fn points_mut(&mut self) -> [Option<&mut Target<f64>>; 2] {
         [Some(&mut self.workpiece_ball), Some(&mut self.spindle_ball)]
     }
     fn channels(&self) -> &[Channel] {
@@ -395,9 +398,6 @@ impl Instrument for RTest<f64> {
             Setting::Table => SharedBy::Setup,
             Setting::Spindle => SharedBy::SpindleSetup,
         }
-    }
-    fn balls_mut(&mut self) -> Option<[&mut [f64; 3]; 2]> {
-        Some([&mut self.workpiece_ball, &mut self.spindle_ball])
     }
     fn following(&self) -> Following {
         Following::Touching(
@@ -447,6 +447,7 @@ impl Instrument for RTest<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chain::Machine;
 
     fn three(reading: Reading<f64>) -> [f64; 3] {
         std::array::from_fn(|i| reading.channels()[i])
@@ -463,9 +464,10 @@ mod tests {
             gravity: [0.0, 0.0, -1.0],
             bodies: Vec::new(),
         };
+        let at = MachineState { machine: &machine, state: &[], errors: &[] };
         let [x, y, z] = [0.03, -0.05, 0.07];
         let vectors =
-            RTest { setting: Setting::Table, workpiece_ball: [0.0; 3], spindle_ball: [x, y, z], sensors: None };
+            RTest { setting: Setting::Table, workpiece_ball: Target::on_table([0.0; 3]), spindle_ball: Target::on_tool([x, y, z]), sensors: None };
         let directions = [[0.6, 0.8, 0.0], [0.0, 0.6, 0.8], [0.8, 0.0, 0.6]];
         let counts = RTest { sensors: Some(directions), ..vectors.clone() };
         let (sin, cos) = 0.4_f64.sin_cos();
@@ -482,9 +484,9 @@ mod tests {
                 let far = (0..3).any(|i| (found[i] - expected[i]).abs() > 1e-15);
                 assert!(!far, "angle {index}: {found:?}, not {expected:?}");
             };
-            near(three(vectors.reading(&machine, &[], &[], askew)), turned);
+            near(three(vectors.reading(at, askew)), turned);
             let counted = directions.map(|direction| (0..3).map(|i| direction[i] * turned[i]).sum());
-            near(three(counts.reading(&machine, &[], &[], askew)), counted);
+            near(three(counts.reading(at, askew)), counted);
         }
     }
 }

@@ -6,8 +6,10 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::Station;
+use super::target::{self, Target};
+use crate::chain::{Frame, Machine};
 use crate::document::fault::{Fault, Within};
-use crate::document::node::{Node, Value};
+use crate::document::node::{Entry, Node, Value};
 use crate::document::print::node_of;
 use crate::document::value::{self as document, Point, Three, Uncertainties, Uncertainty};
 use crate::document::{from_node, schema};
@@ -105,26 +107,78 @@ pub(super) fn written_angles(priors: &[Prior], first: usize) -> Uncertainties {
     Uncertainties([0, 1, 2].map(|i| written_u(priors.get(first + i), Unit::Arcsecond)))
 }
 
-/// The keys of a set-up. A missing one is explained by its documentation.
-pub(super) fn keys<T: DeserializeOwned + JsonSchema>(set_up: &Node) -> Result<T, Fault> {
-    from_node(set_up).map_err(|fault| fault.explained(|key| schema::description::<T>(key)))
+/// The end of the key that states the frame of a point.
+pub(crate) const FRAME: &str = "_frame";
+
+/// What the frames of points are in a schema.
+pub(super) fn frame_schema() -> serde_json::Value {
+    serde_json::json!({
+        "type": "string",
+        "description": "The body on which the point is fixed: \"table\", \"tool\", \"bed\", or \"axis A\" for what an axis \
+                        carries."
+    })
 }
 
-/// A length above zero.
-pub(super) fn positive(key: &str, length: &document::Length, constants: &[Constant]) -> Result<Written, Fault> {
-    let (length, mm) = length.evaluated(key, constants).within(key)?;
-    limits::positive(mm).within(key)?;
-    Ok(Written { length, mm })
+/// A set-up as a file states it, with what its lengths and frames refer to.
+pub struct Stated<'a> {
+    /// The keys without those of frames.
+    keys: Node,
+    frames: Vec<(&'static str, Frame)>,
+    constants: &'a [Constant],
 }
 
-/// A point.
-pub(super) fn point(key: &str, Three(point): &Point, constants: &[Constant]) -> Result<[Written; 3], Fault> {
-    let mut coordinates = [const { Written::number(0.0) }; 3];
-    for (item, (coordinate, length)) in coordinates.iter_mut().zip(point).enumerate() {
-        let (length, mm) = length.evaluated(key, constants).within_item(item).within(key)?;
-        *coordinate = Written { length, mm };
+impl<'a> Stated<'a> {
+    /// The keys of a set-up; `points` are those of the instrument, each in its default frame.
+    pub(super) fn new(
+        points: &[(&'static str, Frame)],
+        keys: &Node,
+        constants: &'a [Constant],
+        machine: &Machine,
+    ) -> Result<Stated<'a>, Fault> {
+        let (mut frames, mut own) = (points.to_vec(), Vec::new());
+        for Entry { key, node, .. } in keys.entries() {
+            let stem = key.strip_suffix(FRAME);
+            match frames.iter_mut().find(|(name, _)| Some(*name) == stem) {
+                Some((_, frame)) => *frame = target::frame(node, machine).within(key)?,
+                None => own.push((key.clone(), node.clone())),
+            }
+        }
+        Ok(Stated { keys: Node::table(own), frames, constants })
     }
-    Ok(coordinates)
+
+    /// The keys that are not frames. A missing one is explained by its documentation.
+    pub(super) fn keys<T: DeserializeOwned + JsonSchema>(&self) -> Result<T, Fault> {
+        let frames = self.frames.iter().map(|(name, _)| format!("{name}{FRAME}"));
+        let explained = |fault: Fault| fault.explained(|key| schema::description::<T>(key)).also_known(frames);
+        from_node(&self.keys).map_err(explained)
+    }
+
+    /// A length above zero.
+    pub(super) fn positive(&self, key: &str, length: &document::Length) -> Result<Written, Fault> {
+        let (length, mm) = length.evaluated(key, self.constants).within(key)?;
+        limits::positive(mm).within(key)?;
+        Ok(Written { length, mm })
+    }
+
+    /// Three coordinates.
+    pub(super) fn coordinates(&self, key: &str, Three(point): &Point) -> Result<[Written; 3], Fault> {
+        let mut coordinates = [const { Written::number(0.0) }; 3];
+        for (item, (coordinate, length)) in coordinates.iter_mut().zip(point).enumerate() {
+            let (length, mm) = length.evaluated(key, self.constants).within_item(item).within(key)?;
+            *coordinate = Written { length, mm };
+        }
+        Ok(coordinates)
+    }
+
+    /// A point of the instrument, the origin of its frame where none is stated.
+    pub(super) fn point<'p>(&self, name: &str, mm: impl Into<Option<&'p Point>>) -> Result<Target<Written>, Fault> {
+        let frame = self.frames.iter().find(|(known, _)| *known == name).map_or(Frame::Bed, |(_, frame)| *frame);
+        let mm = match mm.into() {
+            Some(mm) => self.coordinates(&format!("{name}_mm"), mm)?,
+            None => [const { Written::number(0.0) }; 3],
+        };
+        Ok(Target { frame, mm })
+    }
 }
 
 /// Priors of lengths from their uncertainties, µm.

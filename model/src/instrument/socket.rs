@@ -8,28 +8,26 @@ use serde::{Deserialize, Serialize};
 
 use super::channel::Channel;
 use super::column::{Column, Quantity};
-use super::set_up::{self, SetUp, Written};
+use super::set_up::{self, SetUp, Stated, Written};
 use super::{Contact, 
-    Entry, Fault, Geometry, Group, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station,
-    default_errors, displaced, point,
+    Entry, Fault, Geometry, Group, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station, Target,
+    default_errors, point,
 };
-use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::chain::{Frame, MachineState};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
-use crate::session::expression::Constant;
 use crate::unit::Unit;
 
 /// The socket in R, then the ball in the tool frame.
-pub const PARAMETERS: [InstrumentParameter; 6] = [
-    InstrumentParameter::length("socket", "x", SharedBy::Socket),
-    InstrumentParameter::length("socket", "y", SharedBy::Socket),
-    InstrumentParameter::length("socket", "z", SharedBy::Socket),
-    InstrumentParameter::length("ball", "x", SharedBy::SpindleSetup),
-    InstrumentParameter::length("ball", "y", SharedBy::SpindleSetup),
-    InstrumentParameter::length("ball", "z", SharedBy::SpindleSetup),
-];
+pub const PARAMETERS: [InstrumentParameter; 6] = InstrumentParameter::all(&[
+    &InstrumentParameter::point("socket", SharedBy::Socket),
+    &InstrumentParameter::point("ball", SharedBy::SpindleSetup),
+]);
+
+/// The points on bodies, that of the table first.
+const POINTS: &[(&str, Frame)] = &[("ball", Frame::Tool)];
 
 pub(super) const ENTRY: Entry = Entry {
     free: Some("socket"),
@@ -38,7 +36,7 @@ pub(super) const ENTRY: Entry = Entry {
     default_errors: default_errors::all_locations,
     // The ball at a robot's flange stays mounted from socket to socket.
     spindle_setup: Some("tool"),
-    ..Entry::new(InstrumentKind::Socket, ["socket", "a ball in fixed sockets"], &PARAMETERS, schema::properties::<Keys>, read)
+    ..Entry::new(InstrumentKind::Socket, ["socket", "a ball in fixed sockets"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
 };
 
 /// The channels.
@@ -61,11 +59,11 @@ struct Keys {
     socket_mm: Option<document::Point>,
 }
 
-fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
-    let keys: Keys = set_up::keys(set_up)?;
-    let ball = set_up::point("ball_mm", &keys.ball_mm, constants)?;
+fn read(set_up: &Stated<'_>) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up.keys()?;
+    let ball = set_up.point("ball", &keys.ball_mm)?;
     let priors = [Prior::Free; 3].into_iter().chain(set_up::lengths(&keys.ball_u_um)).collect();
-    let stated = keys.socket_mm.map(|point| set_up::point("socket_mm", &point, constants)).transpose()?;
+    let stated = keys.socket_mm.map(|point| set_up.coordinates("socket_mm", &point)).transpose()?;
     if stated.is_some() && keys.socket.is_none() {
         let help = "add `socket = \"…\"`, the name of the socket of all poses of the test";
         return Err(KeyFault::new("`socket_mm` without the name of the socket", help).at("socket_mm"));
@@ -79,8 +77,8 @@ fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
 /// A ball and its socket, mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Socket<N> {
-    /// Centre of the ball in the tool frame.
-    pub ball: [N; 3],
+    /// Centre of the ball.
+    pub ball: Target<N>,
     /// Centre of the socket in R.
     pub socket: [N; 3],
     /// Whether that centre is known: stated, or the mean of poses.
@@ -91,21 +89,20 @@ impl<N> Geometry<N> for Socket<N> {
     type Over<M> = Socket<M>;
 
     fn map<M>(&self, to: &impl Fn(&N) -> M) -> Socket<M> {
-        Socket { ball: point(&self.ball, to), socket: point(&self.socket, to), is_located: self.is_located }
+        Socket { ball: self.ball.map(to), socket: point(&self.socket, to), is_located: self.is_located }
     }
     /// The closure: ball less socket, mm.
     fn reading<S: Scalar<Nominal = N>>(
         &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
+        at: MachineState<'_, S>,
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Reading<S>
     where
         N: Nominal,
     {
-        let ball = machine.tool_point(state, errors, displaced(self.ball, 3, &unknown));
-        Reading::of(ball.minus(displaced(self.socket, 0, &unknown)).0)
+        let ball = self.ball.in_r(at, 3, &unknown);
+        let socket = Target { frame: Frame::Bed, mm: self.socket };
+        Reading::of(ball.minus(socket.displaced(0, &unknown)).0)
     }
     fn points(&self) -> [Option<InstrumentPoint<'_, N>>; 2] {
         [None, InstrumentPoint::of("ball", &self.ball, 3)]
@@ -115,7 +112,7 @@ impl<N> Geometry<N> for Socket<N> {
 impl Instrument for Socket<f64> {
     fn written(&self, priors: &[Prior]) -> Option<Node> {
         let keys = Keys {
-            ball_mm: set_up::written_point(self.ball),
+            ball_mm: set_up::written_point(self.ball.mm),
             ball_u_um: set_up::written_lengths(priors, 3),
             socket: None,
             socket_mm: self.is_located.then(|| set_up::written_point(self.socket)),
@@ -131,7 +128,7 @@ impl Instrument for Socket<f64> {
     fn is_located(&self) -> bool {
         self.is_located
     }
-    fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
+    fn points_mut(&mut self) -> [Option<&mut Target<f64>>; 2] {
         [None, Some(&mut self.ball)]
     }
     fn channels(&self) -> &[Channel] {

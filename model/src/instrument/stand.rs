@@ -5,8 +5,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::point;
 use super::set_up::Written;
-use super::{InstrumentParameter, SharedBy, point};
 use crate::frames::{Point, Rotation, SmallMotion, dot_nominal};
 use crate::median::median;
 use crate::scalar::{Nominal, Scalar};
@@ -20,18 +20,6 @@ const MIN_POINTS: usize = 3;
 const ON_A_LINE: f64 = 1e-9;
 /// Share with which a rotation about such a line stays as it is.
 const AS_IT_IS: f64 = 1e-6;
-
-/// The parameters of the pose: three positions and three angles.
-pub(super) const fn parameters(thing: &'static str) -> [InstrumentParameter; 6] {
-    [
-        InstrumentParameter::length(thing, "x", SharedBy::Setup),
-        InstrumentParameter::length(thing, "y", SharedBy::Setup),
-        InstrumentParameter::length(thing, "z", SharedBy::Setup),
-        InstrumentParameter::angle(thing, "a", SharedBy::Setup),
-        InstrumentParameter::angle(thing, "b", SharedBy::Setup),
-        InstrumentParameter::angle(thing, "c", SharedBy::Setup),
-    ]
-}
 
 /// The small motion given by the first six parameters, if one of them is included.
 pub(super) fn pose_error<S: Scalar>(unknown: &impl Fn(usize) -> Option<S>) -> Option<SmallMotion<S>> {

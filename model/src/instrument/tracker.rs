@@ -16,44 +16,38 @@ use serde::{Deserialize, Serialize};
 use super::bearing::{Sight, bearings, direction, observed_bearings};
 use super::channel::Channel;
 use super::column::{Column, Quantity};
-use super::set_up::{self, SetUp, Written};
-use super::stand::{self, Stand, pose_error};
+use super::set_up::{self, SetUp, Stated, Written};
+use super::stand::{Stand, pose_error};
 use super::{Aligned, Travel, 
     Checked, Entry, Fault, Geometry, Group, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy,
-    Station, default_errors, displaced, point,
+    Station, Target, default_errors,
 };
-use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::chain::{AxisPosition, Frame, Machine, MachineState};
 use crate::document::node::Node;
 use crate::document::{Fault as KeyFault, schema, value as document};
 use crate::frames::{Point, cross};
 use crate::scalar::{Nominal, Scalar};
 use crate::session::Prior;
-use crate::session::expression::Constant;
 use crate::unit::Unit;
 
-const POSE: [InstrumentParameter; 6] = stand::parameters("tracker");
-
 /// The pose, then the target in the tool frame.
-pub const PARAMETERS: [InstrumentParameter; 9] = [
-    POSE[0],
-    POSE[1],
-    POSE[2],
-    POSE[3],
-    POSE[4],
-    POSE[5],
-    InstrumentParameter::length("target", "x", SharedBy::SpindleSetup),
-    InstrumentParameter::length("target", "y", SharedBy::SpindleSetup),
-    InstrumentParameter::length("target", "z", SharedBy::SpindleSetup),
-];
+pub const PARAMETERS: [InstrumentParameter; 9] = InstrumentParameter::all(&[
+    &InstrumentParameter::point("tracker", SharedBy::Setup),
+    &InstrumentParameter::rotation("tracker", SharedBy::Setup),
+    &InstrumentParameter::point("target", SharedBy::SpindleSetup),
+]);
 
 /// The first parameter of the target.
 const TARGET: usize = 6;
+
+/// The points on bodies, that of the table first.
+const POINTS: &[(&str, Frame)] = &[("target", Frame::Tool)];
 
 pub(super) const ENTRY: Entry = Entry {
     free: Some("tracker"),
     reads_poses: true,
     default_errors: default_errors::all_locations,
-    ..Entry::new(InstrumentKind::Tracker, ["tracker", "a laser tracker"], &PARAMETERS, schema::properties::<Keys>, read)
+    ..Entry::new(InstrumentKind::Tracker, ["tracker", "a laser tracker"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
 };
 
 /// The channels of coordinates.
@@ -96,13 +90,13 @@ struct Keys {
     tracker_mm: Option<document::Point>,
 }
 
-fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
-    let keys: Keys = set_up::keys(set_up)?;
-    let target = set_up::point("target_mm", &keys.target_mm, constants)?;
+fn read(set_up: &Stated<'_>) -> Result<SetUp, KeyFault> {
+    let keys: Keys = set_up.keys()?;
+    let target = set_up.point("target", &keys.target_mm)?;
     let priors = [Prior::Free; 6].into_iter().chain(set_up::lengths(&keys.target_u_um)).collect();
     let mut stand = Stand::at_origin();
     if let Some(place) = &keys.tracker_mm {
-        let place = set_up::point("tracker_mm", place, constants)?;
+        let place = set_up.coordinates("tracker_mm", place)?;
         stand.origin = place.map(|coordinate| Written::number(-coordinate.mm));
     }
     let is_polar = keys.tracker_mm.is_some();
@@ -112,8 +106,8 @@ fn read(set_up: &Node, constants: &[Constant]) -> Result<SetUp, KeyFault> {
 /// A tracker as set up for one test, lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tracker<N> {
-    /// The target in the tool frame.
-    pub target: [N; 3],
+    /// The target.
+    pub target: Target<N>,
     /// Where the tracker stands.
     pub stand: Stand<N>,
     /// Whether range and angles are read, not coordinates.
@@ -123,8 +117,7 @@ pub struct Tracker<N> {
 impl<N: Nominal> Tracker<N> {
     /// The nominal line of sight in the tracker's frame, with across towards increasing azimuth.
     fn sight<S: Scalar<Nominal = N>>(&self, machine: &Machine, state: &[AxisPosition<N>]) -> Sight<S> {
-        let none = vec![BodyErrors::<S>::NONE; machine.axes.len()];
-        let seen = self.stand.point(machine.tool_point(state, &none, Point::nominal(self.target)));
+        let seen = self.stand.point(self.target.nominal_in_r::<S>(machine, state));
         let [x, y, _] = seen.0;
         let (range, level) = (seen.norm(), (x * x + y * y).sqrt());
         let ahead = Point(seen.0.map(|x| x / range));
@@ -137,7 +130,7 @@ impl<N> Geometry<N> for Tracker<N> {
     type Over<M> = Tracker<M>;
 
     fn map<M>(&self, to: &impl Fn(&N) -> M) -> Tracker<M> {
-        Tracker { target: point(&self.target, to), stand: self.stand.map(to), is_polar: self.is_polar }
+        Tracker { target: self.target.map(to), stand: self.stand.map(to), is_polar: self.is_polar }
     }
     fn keep_channels(&mut self, has: &dyn Fn(Quantity) -> bool) {
         if has(Quantity::Polar(0)) || has(Quantity::Channel(0)) {
@@ -147,20 +140,18 @@ impl<N> Geometry<N> for Tracker<N> {
     /// The coordinates in the tracker's frame, mm, or range and bearings, mm and rad.
     fn reading<S: Scalar<Nominal = N>>(
         &self,
-        machine: &Machine,
-        state: &[AxisPosition<N>],
-        errors: &[BodyErrors<S>],
+        at: MachineState<'_, S>,
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Reading<S>
     where
         N: Nominal,
     {
-        let target = machine.tool_point(state, errors, displaced(self.target, TARGET, &unknown));
+        let target = self.target.in_r(at, TARGET, &unknown);
         let seen = self.stand.point(pose_error(&unknown).map_or(target, |pose| pose.push(target)));
         if !self.is_polar {
             return Reading::of(seen.0);
         }
-        let [across, up] = bearings(self.sight(machine, state), seen);
+        let [across, up] = bearings(self.sight(at.machine, at.state), seen);
         Reading::of([seen.norm(), across, up])
     }
     fn points(&self) -> [Option<InstrumentPoint<'_, N>>; 2] {
@@ -175,7 +166,7 @@ impl Instrument for Tracker<f64> {
     }
     fn written(&self, priors: &[Prior]) -> Option<Node> {
         let keys = Keys {
-            target_mm: set_up::written_point(self.target),
+            target_mm: set_up::written_point(self.target.mm),
             target_u_um: set_up::written_lengths(priors, TARGET),
             tracker_mm: self.is_polar.then(|| set_up::written_point(self.stand.place_mm())),
         };
@@ -185,7 +176,7 @@ impl Instrument for Tracker<f64> {
         let beside = "Laser tracker, where it sees the target at every position: its place is estimated";
         Handling { beside: Some(beside.into()), ..Handling::default() }
     }
-    fn points_mut(&mut self) -> [Option<&mut [f64; 3]>; 2] {
+    fn points_mut(&mut self) -> [Option<&mut Target<f64>>; 2] {
         [None, Some(&mut self.target)]
     }
     fn channels(&self) -> &[Channel] {
@@ -238,7 +229,7 @@ impl Instrument for Tracker<f64> {
         if !self.is_polar || !checked.readings.observed.is_empty() {
             return Ok(());
         }
-        let points = checked.readings.nominal_points(checked.machine, self.target);
+        let points = checked.readings.nominal_points(checked.machine, &self.target);
         let level = points.into_iter().map(|point| {
             let [x, y, _] = self.stand.point::<f64>(Point(point.into())).0;
             x.hypot(y)

@@ -6,7 +6,7 @@ pub mod jacobian;
 pub mod reach;
 
 use crate::axis::AxisKind;
-use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::chain::{AxisPosition, BodyErrors, Frame, Machine};
 use crate::frames::Point;
 use crate::scalar::Scalar;
 use nalgebra::{Matrix3, Vector3, Vector6};
@@ -43,8 +43,8 @@ pub(super) fn points<S: Scalar<Nominal = f64>>(
         if k > 0 {
             point[k - 1] += 1.0;
         }
-        let reference = machine.tool_point(state, errors, Point::nominal(point));
-        machine.table_point(state, errors, reference)
+        let reference = machine.in_r(Frame::Tool, state, errors, Point::nominal(point));
+        machine.in_frame(Frame::Table, state, errors, reference)
     })
 }
 

@@ -1,7 +1,7 @@
 //! Axis positions that place the balls as requested, for proposals of candidate tests.
 
 use super::trajectory;
-use crate::chain::{BodyErrors, Machine};
+use crate::chain::Machine;
 use crate::instrument::ballbar::BallBar;
 
 /// Largest accepted position error of the balls, mm.
@@ -9,10 +9,8 @@ const POSITION_TOLERANCE_MM: f64 = 1e-6;
 
 /// The two balls in R, nominal: workpiece ball, spindle ball; mm.
 pub fn balls(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> ([f64; 3], [f64; 3]) {
-    let state = machine.axis_positions(at);
-    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
-    let (workpiece, spindle) = bar.balls::<f64>(machine, &state, &none, &|_| None);
-    (workpiece.0, spindle.0)
+    let [workpiece, spindle] = bar.nominal_mm(machine, &machine.axis_positions(at));
+    (workpiece, spindle)
 }
 
 /// The positions of all axes at which the linear axes place the spindle ball at `requested` from the workpiece ball
@@ -24,5 +22,5 @@ pub fn positions_for_bar(machine: &Machine, bar: &BallBar<f64>, at: &[f64], requ
 
 /// A point of an axis and its direction in R, carried by the axes between it and the bed.
 pub fn axis_line(machine: &Machine, at: &[f64], axis: usize) -> ([f64; 3], [f64; 3]) {
-    trajectory::axis_line(machine, &machine.axis_positions(at), axis)
+    machine.axis_line(axis, &machine.axis_positions(at))
 }

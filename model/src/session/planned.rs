@@ -115,7 +115,7 @@ pub fn centre_circle(
         Moved::Circle { axes, centre, .. } => Some((axes, centre)),
         _ => None,
     });
-    let (Some(pair), Some((axes, centre))) = (trajectory::bar_between_points(station), circle) else { return };
+    let (Some(pair), Some((axes, centre))) = (station.between_points(), circle) else { return };
     let is_open = |axis: &usize| !listed[*axis] || axes.contains(axis);
     let open: Vec<usize> = trajectory::linear_axes(machine).into_iter().filter(is_open).collect();
     let (placed, _) = trajectory::solve_linear_axes(machine, &pair, at, &open, *centre);

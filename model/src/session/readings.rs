@@ -8,8 +8,7 @@ use nalgebra::Vector3;
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::driver::DriverSample;
-use crate::frames::Point;
-use crate::instrument::{Reading, Station};
+use crate::instrument::{Reading, Station, Target};
 
 /// The file of readings, for messages about single readings.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -92,15 +91,14 @@ impl Readings {
         }
     }
 
-    /// The nominal position in R of a point of the tool frame, mm, at every row.
-    pub fn nominal_points(&self, machine: &Machine, tool_mm: [f64; 3]) -> Vec<Vector3<f64>> {
-        let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+    /// The nominal position of a point in R, mm, at every row.
+    pub fn nominal_points(&self, machine: &Machine, point: &Target<f64>) -> Vec<Vector3<f64>> {
         let mut state = Vec::new();
-        let point = |row: usize| {
+        let place = |row: usize| {
             self.state(machine, row, &mut state);
-            Vector3::from(machine.tool_point::<f64>(&state, &none, Point(tool_mm)).0)
+            Vector3::from(point.nominal_mm(machine, &state))
         };
-        (0..self.rows()).map(point).collect()
+        (0..self.rows()).map(place).collect()
     }
 
     /// Turns the observed values of the columns into those of the channels, for channels that refer to the nominal

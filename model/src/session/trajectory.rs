@@ -6,10 +6,10 @@ use super::Test;
 use super::motion::{FollowOffset, Motion, Moved, Traversals, length_of};
 use super::readings::Readings;
 use crate::axis::AxisKind;
-use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::chain::{BodyErrors, Machine};
 use crate::frames::Point;
-use crate::instrument::Station;
 use crate::instrument::ballbar::BallBar;
+use crate::instrument::{Station, Target};
 
 /// Pause between two traversals, s.
 const BETWEEN_RUNS_S: f64 = 3.0;
@@ -43,14 +43,14 @@ pub(super) fn states(machine: &Machine, test: &Test, Motion { moved, course }: &
             traversed(&way, course.speed, &mut |_| Ok(states.next().unwrap_or_default()))
         }
         Moved::Follow { axis, offset } => {
-            let Some(mut bar) = bar_between_points(&test.station) else {
+            let Some(mut bar) = test.station.between_points() else {
                 return Err((
                     format!("test \"{}\" has no point of the table to follow", test.name),
                     "a path of kind \"follow\" needs a ball bar, an R-test or a probe".into(),
                 ));
             };
             if *offset == FollowOffset::None {
-                bar.workpiece_ball = table_point_at_tool(machine, &bar, &test.at);
+                bar.workpiece_ball = workpiece_point_at_tool(machine, &bar, &test.at);
             }
             let linear = linear_axes(machine);
             traversed(&along, course.speed, &mut |q| {
@@ -105,26 +105,19 @@ fn on_line(
     (way, states.into_iter())
 }
 
-/// The instrument's points of table and tool, as the ends of a bar.
-pub(super) fn bar_between_points(station: &Station<f64>) -> Option<BallBar<f64>> {
-    station.table_point_mm().map(|point| BallBar {
-        workpiece_ball: point,
-        spindle_ball: station.tool_point_mm(),
-        bar: station.reference_mm(),
-    })
-}
-
-/// The same; both points at the origin of their frames for an instrument without them.
+/// The instrument's points of table and tool, as the ends of a bar; both at the origin of their frames for an instrument
+/// without them.
 fn bar_of(station: &Station<f64>) -> BallBar<f64> {
-    bar_between_points(station).unwrap_or(BallBar { workpiece_ball: [0.0; 3], spindle_ball: [0.0; 3], bar: 0.0 })
+    station.between_points().unwrap_or(BallBar::ORIGINS)
 }
 
-/// The point of the table frame at the tool point.
-fn table_point_at_tool(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> [f64; 3] {
+/// The point of the workpiece ball's frame at the tool point.
+fn workpiece_point_at_tool(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> Target<f64> {
     let state = machine.axis_positions(at);
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
-    let tool = machine.tool_point::<f64>(&state, &none, Point(bar.spindle_ball));
-    machine.table_point::<f64>(&state, &none, tool).0
+    let frame = bar.workpiece_ball.frame;
+    let tool = Point(bar.spindle_ball.nominal_mm(machine, &state));
+    Target { frame, mm: machine.in_frame::<f64>(frame, &state, &none, tool).0 }
 }
 
 /// Follows a path as often as it is traversed.
@@ -157,7 +150,7 @@ fn traversals(
 /// Positions of the axes at these angles of a test's circle; `None` for another motion.
 pub fn on_circle(machine: &Machine, test: &Test, angles: &[f64]) -> Option<Result<Vec<Vec<f64>>, Fault>> {
     let Moved::Circle { axes, radius, centre } = test.motion.as_ref()?.moved else { return None };
-    let circle = Circle::new(machine, &bar_between_points(&test.station)?, &test.at, axes, centre);
+    let circle = Circle::new(machine, &test.station.between_points()?, &test.at, axes, centre);
     Some(circle.map(|circle| angles.iter().map(|angle| circle.state(radius, *angle)).collect()))
 }
 
@@ -248,10 +241,8 @@ pub(super) fn solve_linear_axes(
 
 /// Spindle ball less workpiece ball in R, nominal.
 fn spindle_from_workpiece(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> [f64; 3] {
-    let state = machine.axis_positions(at);
-    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
-    let (workpiece, spindle) = bar.balls::<f64>(machine, &state, &none, &|_| None);
-    spindle.minus(workpiece).0
+    let [workpiece, spindle] = bar.nominal_mm(machine, &machine.axis_positions(at));
+    std::array::from_fn(|i| spindle[i] - workpiece[i])
 }
 
 /// Movement of the spindle ball relative to the workpiece ball per millimetre of a linear axis.
@@ -279,12 +270,11 @@ fn offset_vector(
     offset: FollowOffset,
 ) -> Result<[f64; 3], Fault> {
     let state = machine.axis_positions(at);
-    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
-    let (workpiece, spindle) = bar.balls::<f64>(machine, &state, &none, &|_| None);
+    let [workpiece, spindle] = bar.nominal_mm(machine, &state);
     let on_workpiece_side = axis < machine.workpiece_side;
     // A rotating head carries the spindle ball: the workpiece ball is then on the opposite side.
-    let (carried, sign) = if on_workpiece_side { (workpiece.0, 1.0) } else { (spindle.0, -1.0) };
-    let (origin, along) = axis_line(machine, &state, axis);
+    let (carried, sign) = if on_workpiece_side { (workpiece, 1.0) } else { (spindle, -1.0) };
+    let (origin, along) = machine.axis_line(axis, &state);
     let from: [f64; 3] = std::array::from_fn(|i| carried[i] - origin[i]);
     let height: f64 = (0..3).map(|i| from[i] * along[i]).sum();
     let radial: [f64; 3] = std::array::from_fn(|i| from[i] - height * along[i]);
@@ -302,28 +292,6 @@ fn offset_vector(
         FollowOffset::Tangential => crate::frames::cross(along, Point(radial.map(|x| x / radius))).0,
     };
     Ok(unit.map(|x| sign * bar.bar * x))
-}
-
-/// A point of an axis and its direction in R, carried by the axes between it and the bed.
-pub(super) fn axis_line(machine: &Machine, state: &[AxisPosition<f64>], axis: usize) -> ([f64; 3], [f64; 3]) {
-    let between =
-        if axis < machine.workpiece_side { axis + 1..machine.workpiece_side } else { machine.workpiece_side..axis };
-    let mut carrying = machine.clone();
-    carrying.axes = machine.axes[between.clone()].to_vec();
-    carrying.workpiece_side = if axis < machine.workpiece_side { between.len() } else { 0 };
-    let none = vec![BodyErrors::<f64>::NONE; between.len()];
-    let in_r = |point: [f64; 3]| {
-        let point = Point(point);
-        if axis < machine.workpiece_side {
-            carrying.workpiece_point::<f64>(&state[between.clone()], &none, point).0
-        } else {
-            carrying.tool_point::<f64>(&state[between.clone()], &none, point).0
-        }
-    };
-    let line = &machine.axes[axis];
-    let origin = in_r(line.origin_mm);
-    let tip = in_r(std::array::from_fn(|i| line.origin_mm[i] + line.direction[i]));
-    (origin, std::array::from_fn(|i| tip[i] - origin[i]))
 }
 
 #[cfg(test)]

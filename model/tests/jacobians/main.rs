@@ -4,13 +4,13 @@
 mod topologies;
 
 use abbe_model::axis::AxisKind;
-use abbe_model::chain::{ERRORS_PER_AXIS, Machine};
+use abbe_model::chain::{ERRORS_PER_AXIS, Frame, Machine};
 use abbe_model::component::ErrorName;
 use abbe_model::frames::Rotation;
 use abbe_model::instrument::angle::Angle;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::column::Quantity;
-use abbe_model::instrument::distance::{Distance, StationFrame};
+use abbe_model::instrument::distance::Distance;
 use abbe_model::instrument::laser::Laser;
 use abbe_model::instrument::pointing::Pointing;
 use abbe_model::instrument::pose::Pose;
@@ -18,7 +18,7 @@ use abbe_model::instrument::probe::Probe;
 use abbe_model::instrument::rtest::{RTest, Setting};
 use abbe_model::instrument::stand::Stand;
 use abbe_model::instrument::tracker::Tracker;
-use abbe_model::instrument::{Geometry, InstrumentKind, Station};
+use abbe_model::instrument::{Geometry, InstrumentKind, Station, Target};
 use abbe_model::rotation_error::Body;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
@@ -28,7 +28,7 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use topologies::uniform;
 
-fn ball_bar(workpiece_ball: [f64; 3], spindle_ball: [f64; 3]) -> Station<f64> {
+fn ball_bar(workpiece_ball: Target<f64>, spindle_ball: Target<f64>) -> Station<f64> {
     Station::BallBar(BallBar { workpiece_ball, spindle_ball, bar: 100.0 })
 }
 
@@ -38,12 +38,12 @@ fn stand() -> Stand<f64> {
 }
 
 /// A stylus in a cylinder wide enough to be hit from any position.
-fn probe(artefact: [f64; 3], stylus: [f64; 3]) -> Station<f64> {
+fn probe(artefact: Target<f64>, stylus: Target<f64>) -> Station<f64> {
     Station::Probe(Probe { artefact, axis: [0.6, 0.0, 0.8], radius: 5000.0, stylus, direction: None })
 }
 
 /// Sensors in three directions, far from the other point.
-fn r_test(setting: Setting, workpiece_ball: [f64; 3], spindle_ball: [f64; 3]) -> Station<f64> {
+fn r_test(setting: Setting, workpiece_ball: Target<f64>, spindle_ball: Target<f64>) -> Station<f64> {
     Station::RTest(RTest {
         setting,
         workpiece_ball,
@@ -53,7 +53,7 @@ fn r_test(setting: Setting, workpiece_ball: [f64; 3], spindle_ball: [f64; 3]) ->
 }
 
 /// A laser along a slanted beam that reads all six channels.
-fn laser(optic: [f64; 3], reflector: [f64; 3]) -> Station<f64> {
+fn laser(optic: Target<f64>, reflector: Target<f64>) -> Station<f64> {
     let frame = [[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]];
     let mut laser = Laser { reflector, optic, frame, channels: Vec::new(), is_beam_stated: false, datum: 0.0 };
     laser.keep_channels(&|quantity| matches!(quantity, Quantity::Channel(_)));
@@ -61,9 +61,11 @@ fn laser(optic: [f64; 3], reflector: [f64; 3]) -> Station<f64> {
 }
 
 /// Every instrument between two points.
-fn every_station(table: [f64; 3], tool: [f64; 3]) -> [Station<f64>; 13] {
+fn every_station(table: [f64; 3], tool: [f64; 3]) -> [Station<f64>; 15] {
+    let (on_bed, on_last) = (Target { frame: Frame::Bed, mm: table }, Target { frame: Frame::Axis(0), mm: tool });
+    let (table, tool) = (Target::on_table(table), Target::on_tool(tool));
     let angle = |body| Station::Angle(Angle { about: vec![[0.0, 0.6, 0.8], [1.0, 0.0, 0.0]], body });
-    let distance = |frame| Station::Distance(Distance { station: table, reflector: tool, frame });
+    let distance = |station| Station::Distance(Distance { station, reflector: tool });
     let directions = [[0.6, 0.0, 0.8], [0.0, -1.0, 0.0], [-0.8, 0.0, 0.6]];
     let tracker = |is_polar| Station::Tracker(Tracker { target: tool, stand: stand(), is_polar });
     [
@@ -77,8 +79,10 @@ fn every_station(table: [f64; 3], tool: [f64; 3]) -> [Station<f64>; 13] {
         laser(table, tool),
         angle(Body::Relative),
         angle(Body::Table),
-        distance(StationFrame::Table),
-        distance(StationFrame::Bed),
+        distance(table),
+        distance(on_bed),
+        ball_bar(on_bed, on_last),
+        laser(on_last, tool),
         Station::Pointing(Pointing { directions, is_free: true }),
     ]
 }
@@ -242,7 +246,7 @@ fn the_first_order_of_the_bar_is_the_closed_form() {
         for axis in ["X", "Y", "Z"] {
             readings.positions[machine.axis_index(axis).unwrap()].fill(0.0);
         }
-        let station = ball_bar([0.0, r, h], [-d, 0.0, 0.0]);
+        let station = Station::between([0.0, r, h], [-d, 0.0, 0.0], 100.0);
         let model = TestModel::new(machine.clone(), station, &readings);
         let found = model.sensitivities(&SlotValues::zero(model.slots()), &slots, 0..model.rows());
         for row in 0..model.rows() {

@@ -1,6 +1,7 @@
 //! Properties of points transformed through random chains.
 
 use abbe_model::axis::AxisKind;
+use abbe_model::chain::Frame;
 use abbe_model::component::ErrorKind;
 use abbe_model::frames::{Point, Rotation};
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -12,8 +13,8 @@ use super::machines::{Drawn, cases, is_angle, machines, point};
 fn both(drawn: &Drawn, factor: f64, table: [f64; 3], tool: [f64; 3]) -> [[f64; 3]; 2] {
     let (state, bodies) = (drawn.state(), drawn.bodies(factor));
     [
-        drawn.machine.workpiece_point(&state, &bodies, Point(table)).0,
-        drawn.machine.tool_point(&state, &bodies, Point(tool)).0,
+        drawn.machine.in_r(Frame::Table, &state, &bodies, Point(table)).0,
+        drawn.machine.in_r(Frame::Tool, &state, &bodies, Point(tool)).0,
     ]
 }
 
@@ -108,8 +109,8 @@ proptest! {
         let (state, bodies) = (drawn.state(), drawn.bodies(1.0));
         let [on_table, on_tool] = both(&drawn, 1.0, table, tool);
         let machine = &drawn.machine;
-        prop_assert!(apart(machine.table_point(&state, &bodies, Point(on_table)).0, table) < 1e-9);
-        prop_assert!(apart(machine.spindle_point(&state, &bodies, Point(on_tool)).0, tool) < 1e-9);
+        prop_assert!(apart(machine.in_frame(Frame::Table, &state, &bodies, Point(on_table)).0, table) < 1e-9);
+        prop_assert!(apart(machine.in_frame(Frame::Tool, &state, &bodies, Point(on_tool)).0, tool) < 1e-9);
         for index in 0..machine.axes.len() {
             let pushed = machine.push(index, &state, &bodies, Point(table));
             prop_assert!(apart(machine.pull(index, &state, &bodies, pushed).0, table) < 1e-9);
@@ -122,8 +123,8 @@ proptest! {
         let drawn = drawn.with(Rotation::SmallAngle);
         let gap = |factor: f64| -> [f64; 3] {
             let (state, bodies) = (drawn.state(), drawn.bodies(factor));
-            let there = drawn.machine.workpiece_point(&state, &bodies, Point(table));
-            let back = drawn.machine.table_point(&state, &bodies, there).0;
+            let there = drawn.machine.in_r(Frame::Table, &state, &bodies, Point(table));
+            let back = drawn.machine.in_frame(Frame::Table, &state, &bodies, there).0;
             std::array::from_fn(|i| back[i] - table[i])
         };
         let (whole, half) = (gap(0.1), gap(0.05));
@@ -192,8 +193,9 @@ proptest! {
         // sign.
         let tool_in_the_mirror = mirror(tool);
         for index in 0..drawn.machine.axes.len() {
-            let moment = drawn.machine.gravity_moment_mm(index, &drawn.state(), tool);
-            let shown = mirrored.machine.gravity_moment_mm(index, &drawn.state(), tool_in_the_mirror);
+            let frame = if index < drawn.machine.workpiece_side { Frame::Table } else { Frame::Tool };
+            let moment = drawn.machine.gravity_moment_mm(index, &drawn.state(), frame, tool);
+            let shown = mirrored.machine.gravity_moment_mm(index, &drawn.state(), frame, tool_in_the_mirror);
             let sign = if drawn.machine.axes[index].kind == AxisKind::Rotary { 1.0 } else { -1.0 };
             prop_assert!((shown - sign * moment).abs() < 1e-9, "{shown} {moment}");
         }
@@ -209,7 +211,8 @@ proptest! {
             let Some(axis) = machine.axes.get(index) else { continue };
             let lever = Vector3::from(carried) - Vector3::from(axis.origin_mm);
             let moment = Vector3::from(axis.direction).dot(&lever.cross(&Vector3::from(machine.gravity)));
-            let found = machine.gravity_moment_mm(index, &drawn.state(), at);
+            let frame = if index < machine.workpiece_side { Frame::Table } else { Frame::Tool };
+            let found = machine.gravity_moment_mm(index, &drawn.state(), frame, at);
             prop_assert!((found - moment).abs() < 1e-8, "{index}: {found} {moment}");
         }
     }
@@ -219,11 +222,11 @@ proptest! {
         let (state, bodies) = (drawn.state(), drawn.bodies(0.0));
         let mut at_zero = drawn.clone();
         at_zero.positions.fill(0.0);
-        let still = drawn.machine.workpiece_point(&at_zero.state(), &bodies, Point(table));
+        let still = drawn.machine.in_r(Frame::Table, &at_zero.state(), &bodies, Point(table));
         prop_assert!(apart(still.0, table) < 1e-12);
         let turned = Matrix3::from_fn(|i, j| {
             let unit: [f64; 3] = std::array::from_fn(|k| if k == j { 1.0 } else { 0.0 });
-            let at = |point| drawn.machine.workpiece_point(&state, &bodies, Point(point)).0[i];
+            let at = |point| drawn.machine.in_r(Frame::Table, &state, &bodies, Point(point)).0[i];
             at(unit) - at([0.0; 3])
         });
         prop_assert!((turned * turned.transpose() - Matrix3::identity()).norm() < 1e-11);

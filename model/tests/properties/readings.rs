@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use abbe_model::axis::AxisKind;
-use abbe_model::instrument::Station;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::rtest::{RTest, Setting};
 use abbe_model::instrument::socket::Socket;
 use abbe_model::instrument::stand::Stand;
 use abbe_model::instrument::tracker::Tracker;
+use abbe_model::instrument::{Station, Target};
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 use abbe_model::unit::InternalUnit;
@@ -28,19 +28,21 @@ struct DrawnTest {
 
 fn station() -> impl Strategy<Value = Station<f64>> {
     let turned = [[0.0, 1.0, 0.0], [-0.6, 0.0, 0.8], [0.8, 0.0, 0.6]];
-    (point(), point(), 0_usize..5).prop_map(move |(table, tool, kind)| match kind {
-        0 => Station::BallBar(BallBar { workpiece_ball: table, spindle_ball: tool, bar: 100.0 }),
-        1 => {
-            let stand = Stand { rotation: turned, origin: table };
-            Station::Tracker(Tracker { target: tool, stand, is_polar: false })
+    (point(), point(), 0_usize..5).prop_map(move |(at, tool, kind)| {
+        match (kind, Target::on_table(at), Target::on_tool(tool)) {
+            (0, workpiece_ball, spindle_ball) => Station::BallBar(BallBar { workpiece_ball, spindle_ball, bar: 100.0 }),
+            (1, _, target) => {
+                let stand = Stand { rotation: turned, origin: at };
+                Station::Tracker(Tracker { target, stand, is_polar: false })
+            }
+            (2, _, ball) => Station::Socket(Socket { ball, socket: at, is_located: true }),
+            (kind, workpiece_ball, spindle_ball) => Station::RTest(RTest {
+                setting: if kind == 3 { Setting::Table } else { Setting::Spindle },
+                workpiece_ball,
+                spindle_ball,
+                sensors: None,
+            }),
         }
-        2 => Station::Socket(Socket { ball: tool, socket: table, is_located: true }),
-        kind => Station::RTest(RTest {
-            setting: if kind == 3 { Setting::Table } else { Setting::Spindle },
-            workpiece_ball: table,
-            spindle_ball: tool,
-            sensors: None,
-        }),
     })
 }
 

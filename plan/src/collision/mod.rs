@@ -54,7 +54,7 @@ pub fn clearances(session: &Session) -> Vec<TestClearance> {
 /// With `measured`, tests with data count, too.
 pub fn unchecked(session: &Session, measured: bool) -> Option<String> {
     let moves = |test: &Test| {
-        test.motion.is_some() && test.station.table_point_mm().is_some() && (measured || test.readings.is_none())
+        test.motion.is_some() && test.station.table_point().is_some() && (measured || test.readings.is_none())
     };
     (session.machine.bodies.is_empty() && session.tests.iter().any(moves)).then(|| {
         "clearance is not checked: the machine states no `[[body]]`, such as its table and its spindle".to_string()

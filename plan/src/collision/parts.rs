@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::body::{ClearanceSizes, Holder};
-use abbe_model::chain::Machine;
+use abbe_model::chain::{Frame, Machine};
+use abbe_model::instrument::Target;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::session::moves::Mounted;
 use abbe_model::session::{Session, Test};
@@ -100,12 +101,13 @@ impl<'m> Parts<'m> {
         let mut parts: Vec<Part> = bodies.0.to_vec();
         let bar = test.station.bar().cloned();
         if let Some(bar) = &bar {
-            let stem = |name: &str, side: Side, from: [f64; 3], up: f64, Holder { radius_mm, length_mm }: Holder| {
+            let stem = |name: &str, side: Side, ball: Target<f64>, up: f64, Holder { radius_mm, length_mm }: Holder| {
+                let from = ball.mm;
                 let to = [from[0], from[1], from[2] + up * length_mm];
                 Part {
                     name: name.to_string(),
                     side,
-                    axis: outermost(machine, side),
+                    axis: machine.carriers(ball.frame).next(),
                     shape: Shape::capsule(from, to, radius_mm),
                     stem: Some(([from, to], radius_mm)),
                 }
@@ -137,16 +139,15 @@ impl<'m> Parts<'m> {
             .parts
             .iter()
             .map(|part| {
-                let motion = self.carried(part.axis, at);
+                let motion = self.carried(frame(part.axis), at);
                 let placed = part.shape.moved(&motion);
                 (motion, placed)
             })
             .collect();
         let ends = self.bar.as_ref().map(|bar| {
-            let of = |side: Side, point: [f64; 3]| -> [f64; 3] {
-                self.carried(outermost(self.machine, side), at).transform_point(point.into()).into()
-            };
-            [of(Side::Workpiece, bar.workpiece_ball), of(Side::Tool, bar.spindle_ball)]
+            let of =
+                |ball: Target<f64>| -> [f64; 3] { self.carried(ball.frame, at).transform_point(ball.mm.into()).into() };
+            [of(bar.workpiece_ball), of(bar.spindle_ball)]
         });
         let mut found: Option<Found> = None;
         for pair in self.pairs.iter().filter(|pair| self.is_compared(pair, mounted, compared)) {
@@ -183,12 +184,14 @@ impl<'m> Parts<'m> {
 
     /// Whether an axis that moves is between two parts.
     fn moves(&self, pair: &Pair, moving: &[bool]) -> bool {
-        let carries = |carrier: Option<usize>| order(self.machine, carrier).into_iter().any(|axis| moving[axis]);
+        let carries = |frame: Frame| self.machine.carriers(frame).any(|axis| moving[axis]);
         let one = match pair.one {
-            Some(one) => carries(self.parts[one].axis),
-            None => [Side::Workpiece, Side::Tool].into_iter().any(|side| carries(outermost(self.machine, side))),
+            Some(one) => carries(frame(self.parts[one].axis)),
+            None => {
+                self.bar.iter().flat_map(|bar| [bar.workpiece_ball, bar.spindle_ball]).any(|ball| carries(ball.frame))
+            }
         };
-        one || carries(self.parts[pair.other].axis)
+        one || carries(frame(self.parts[pair.other].axis))
     }
 
     /// The clearance of the bar and a part, without what both have at the ball that they share.
@@ -206,9 +209,9 @@ impl<'m> Parts<'m> {
         bar.clearance(&Shape::capsule(beyond(ball, end, skipped), end, stem).moved(&at), most)
     }
 
-    /// The motion of what an axis carries, from all axes at zero.
-    fn carried(&self, axis: Option<usize>, at: &[f64]) -> Pose {
-        order(self.machine, axis).into_iter().fold(Pose::identity(), |pose, axis| {
+    /// The motion of a frame from all axes at zero.
+    fn carried(&self, frame: Frame, at: &[f64]) -> Pose {
+        self.machine.carriers(frame).fold(Pose::identity(), |pose, axis| {
             let (own, q) = (&self.machine.axes[axis], at[axis]);
             let direction = Vector::from(own.direction);
             match own.kind {
@@ -223,22 +226,9 @@ impl<'m> Parts<'m> {
     }
 }
 
-/// The axis that carries the workpiece or the tool.
-fn outermost(machine: &Machine, side: Side) -> Option<usize> {
-    match side {
-        Side::Workpiece => (machine.workpiece_side > 0).then_some(0),
-        Side::Tool => machine.axes.len().checked_sub(1).filter(|last| *last >= machine.workpiece_side),
-        Side::Bed => None,
-    }
-}
-
-/// The axes between a part and the bed, from the part on.
-fn order(machine: &Machine, carrier: Option<usize>) -> Vec<usize> {
-    match carrier {
-        None => Vec::new(),
-        Some(axis) if axis < machine.workpiece_side => (axis..machine.workpiece_side).collect(),
-        Some(axis) => (machine.workpiece_side..=axis).rev().collect(),
-    }
+/// The frame of what an axis carries, or of the bed.
+fn frame(axis: Option<usize>) -> Frame {
+    axis.map_or(Frame::Bed, Frame::Axis)
 }
 
 /// The point at a distance from one end of a line; its other end if it is shorter.

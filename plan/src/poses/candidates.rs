@@ -5,8 +5,7 @@ use std::f64::consts::TAU;
 
 use abbe_model::Diagnostic;
 use abbe_model::axis::{Axis, AxisKind};
-use abbe_model::chain::{BodyErrors, Machine};
-use abbe_model::frames::Point;
+use abbe_model::chain::Machine;
 use abbe_model::instrument::{Contact, Station};
 use abbe_model::session::placing::axis_line;
 use abbe_model::session::readings::Readings;
@@ -76,7 +75,7 @@ pub(super) fn draw(
 ) -> Result<Candidates, Diagnostic> {
     let machine = &*session.machine;
     let station = &test.station;
-    let is_placed = station.table_point_mm().is_some();
+    let is_placed = station.table_point().is_some();
     let untravelled = machine.axes.iter().find(|axis| axis.kind == AxisKind::Linear && axis.travel.is_none());
     if let (Some(axis), false) = (untravelled, is_placed) {
         return Err(Diagnostic::identification(format!(
@@ -142,8 +141,7 @@ fn is_permitted(machine: &Machine, station: &Station<f64>, at: &[f64], limits: &
     if !inside {
         return false;
     }
-    let none = vec![BodyErrors::<f64>::NONE; at.len()];
-    let tool = machine.tool_point::<f64>(&machine.axis_positions(at), &none, Point(station.tool_point_mm())).0;
+    let tool = station.tool_point().nominal_mm(machine, &machine.axis_positions(at));
     let in_box = |limits: &[[f64; 2]; 3]| (0..3).all(|i| tool[i] >= limits[i][0] && tool[i] <= limits[i][1]);
     if !limits.box_mm.as_ref().is_none_or(in_box) {
         return false;

@@ -12,11 +12,11 @@
 
 use std::f64::consts::TAU;
 
-use abbe_model::chain::{BodyErrors, Machine};
+use abbe_model::chain::{BodyErrors, Frame, Machine, MachineState};
 use abbe_model::frames::{Point, cross};
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::probe::Probe;
-use abbe_model::instrument::{Contact, Station};
+use abbe_model::instrument::{Contact, Station, Target};
 use abbe_model::session::placing::positions_for_bar;
 use rand_pcg::Pcg64;
 
@@ -34,8 +34,8 @@ const TOUCHING_MM: f64 = 1e-6;
 pub(super) enum Place {
     /// Nothing.
     Free,
-    /// The tool's point is apart from a point of the table frame by a vector in R, mm.
-    OnTable { point_mm: [f64; 3], apart_mm: [f64; 3] },
+    /// The tool's point is apart from a point of the table by a vector in R, mm.
+    OnTable { point: Target<f64>, apart_mm: [f64; 3] },
     /// The tool's point is at a point of R, mm.
     InR([f64; 3]),
 }
@@ -48,11 +48,12 @@ impl Place {
             (_, Some(probe)) => {
                 let turn = between(random, [0.0, TAU]);
                 let height = between(random, height_mm);
-                Place::OnTable { point_mm: surface_point(probe, turn, height), apart_mm: [0.0; 3] }
+                Place::OnTable { point: surface_point(probe, turn, height), apart_mm: [0.0; 3] }
             }
             (Contact::AtDistance(distance_mm), _) => {
                 let apart_mm = upward(random).map(|x| x * distance_mm);
-                Place::OnTable { point_mm: station.table_point_mm().unwrap_or_default(), apart_mm }
+                let point = station.table_point().unwrap_or(Target::on_table([0.0; 3]));
+                Place::OnTable { point, apart_mm }
             }
             (Contact::None | Contact::Touching, None) => Place::Free,
         }
@@ -60,17 +61,15 @@ impl Place {
 
     /// The positions that meet it, from drawn ones; `None` if none are found.
     pub fn met(&self, machine: &Machine, station: &Station<f64>, drawn: &[f64]) -> Option<Vec<f64>> {
-        let tool_mm = station.tool_point_mm();
+        let tool = station.tool_point();
         let at = match *self {
             Place::Free => drawn.to_vec(),
-            Place::InR(point_mm) => solved(machine, tool_mm, point_mm, drawn)?,
-            Place::OnTable { point_mm, apart_mm } => {
-                let bar = BallBar { workpiece_ball: point_mm, spindle_ball: tool_mm, bar: 0.0 };
+            Place::InR(point_mm) => solved(machine, tool.mm, point_mm, drawn)?,
+            Place::OnTable { point, apart_mm } => {
+                let bar = BallBar { workpiece_ball: point, spindle_ball: tool, bar: 0.0 };
                 positions_for_bar(machine, &bar, drawn, apart_mm).or_else(|| {
-                    let none = vec![BodyErrors::<f64>::NONE; drawn.len()];
-                    let carried =
-                        machine.workpiece_point::<f64>(&machine.axis_positions(drawn), &none, Point(point_mm)).0;
-                    solved(machine, tool_mm, std::array::from_fn(|i| carried[i] + apart_mm[i]), drawn)
+                    let carried = point.nominal_mm(machine, &machine.axis_positions(drawn));
+                    solved(machine, tool.mm, std::array::from_fn(|i| carried[i] + apart_mm[i]), drawn)
                 })?
             }
         };
@@ -99,7 +98,7 @@ impl Place {
 /// The positions at which the axes of the tool side bring the tool's point to a point of R.
 fn solved(machine: &Machine, tool_mm: [f64; 3], point_mm: [f64; 3], drawn: &[f64]) -> Option<Vec<f64>> {
     let none = vec![BodyErrors::<f64>::NONE; drawn.len()];
-    let wanted = machine.table_point::<f64>(&machine.axis_positions(drawn), &none, Point(point_mm)).0;
+    let wanted = machine.in_frame::<f64>(Frame::Table, &machine.axis_positions(drawn), &none, Point(point_mm)).0;
     let axes: Vec<usize> = (machine.workpiece_side..machine.axes.len()).collect();
     reach::from_start(machine, tool_mm, wanted, &axes, drawn)
 }
@@ -107,19 +106,21 @@ fn solved(machine: &Machine, tool_mm: [f64; 3], point_mm: [f64; 3], drawn: &[f64
 /// Whether the probe touches the surface from outside.
 fn touches(machine: &Machine, probe: &Probe<f64>, at: &[f64]) -> bool {
     let none = vec![BodyErrors::<f64>::NONE; at.len()];
-    let geometry = probe.geometry::<f64>(machine, &machine.axis_positions(at), &none, |_| None);
+    let state = machine.axis_positions(at);
+    let geometry = probe.geometry::<f64>(MachineState { machine, state: &state, errors: &none }, |_| None);
     let [_, outward, _] = geometry.quadratic();
     let cosine = -outward / (geometry.radius * geometry.step_length.unwrap_or(1.0));
     cosine >= LEAST_COSINE && geometry.distance().abs() <= TOUCHING_MM
 }
 
-/// The centre of the stylus in the table frame that touches the cylinder at an angle and at a height above its point.
-fn surface_point(probe: &Probe<f64>, turn: f64, height: f64) -> [f64; 3] {
+/// The centre of the stylus, in the frame of the artefact, that touches the cylinder at an angle and at a height above its point.
+fn surface_point(probe: &Probe<f64>, turn: f64, height: f64) -> Target<f64> {
     let along = probe.axis;
     let first = across(along);
     let second = cross(along, Point(first)).0;
     let (sin, cos) = turn.sin_cos();
-    std::array::from_fn(|i| probe.artefact[i] + height * along[i] + probe.radius * (cos * first[i] + sin * second[i]))
+    let across = |i: usize| probe.radius * (cos * first[i] + sin * second[i]);
+    Target { mm: std::array::from_fn(|i| probe.artefact.mm[i] + height * along[i] + across(i)), ..probe.artefact }
 }
 
 /// A direction, uniform over the upper half of the sphere.

@@ -131,7 +131,7 @@ fn tool(session: &Session, machine: &Machine, head: &[Axis]) -> Vec<String> {
     let points: Vec<_> = session.tests.iter().filter_map(|test| test.station.points()[1]).collect();
     let mut words = Vec::new();
     if let Some(point) = points.first() {
-        let is_centre = points.iter().all(|point| point.mm.iter().all(|mm| mm.abs() < THROUGH_MM));
+        let is_centre = points.iter().all(|point| point.target.mm.iter().all(|mm| mm.abs() < THROUGH_MM));
         words.push(match is_centre {
             true => format!(
                 "Tool length: from the spindle nose to the centre of the {}, as measured. The tool point is that centre.",

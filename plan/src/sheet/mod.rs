@@ -6,7 +6,7 @@ mod mounts;
 use abbe_identify::series::paths::{SetUpPath, set_up};
 use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
-use abbe_model::chain::Machine;
+use abbe_model::chain::{Frame, Machine};
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::{Handling, InstrumentPoint};
 use abbe_model::session::placing::{balls, positions_for_bar};
@@ -68,11 +68,13 @@ pub struct TestSheet {
 }
 
 /// A point of the instrument.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PlacedPoint {
     /// What is there: `spindle ball`, `reflector`.
     pub name: &'static str,
-    /// In its frame, mm.
+    /// The body on which it is fixed, in words: `the table`, `axis A`.
+    pub body: String,
+    /// In the frame of that body, mm.
     pub own_mm: [f64; 3],
     /// In R at the start, mm.
     pub start_mm: [f64; 3],
@@ -121,7 +123,7 @@ pub fn sheets(session: &Session, times: SetUpTimes, basic_bar_mm: Option<f64>) -
         let Some(readings) = &test.readings else { continue };
         let Some(path) = set_up(&complete.machine, &test.name, &test.station, readings) else { continue };
         let clearance = clearances.iter().find(|found| found.test == test.name).cloned();
-        let before = mounts::mounting(&complete.tests[..number], test, basic_bar_mm);
+        let before = mounts::mounting(&complete.machine, &complete.tests[..number], test, basic_bar_mm);
         let own = sheet(&complete.machine, before, test, readings, path, times);
         sheets.push(TestSheet { clearance, ..own });
     }
@@ -154,7 +156,11 @@ fn sheet(
     let moving_s = readings.time_s.last().zip(readings.time_s.first()).map_or(0.0, |(last, first)| last - first);
     let point = |point: InstrumentPoint<'_, f64>, start: Option<&[f64; 3]>| PlacedPoint {
         name: point.name,
-        own_mm: *point.mm,
+        body: match point.target.frame {
+            frame @ Frame::Axis(_) => frame.word(machine),
+            frame => format!("the {}", frame.word(machine)),
+        },
+        own_mm: point.target.mm,
         start_mm: start.copied().unwrap_or_default(),
         u_mm: uncertainty_mm(test, point.first),
     };

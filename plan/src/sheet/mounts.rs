@@ -1,5 +1,6 @@
 //! What an operator mounts and changes before each test.
 
+use abbe_model::chain::Machine;
 use abbe_model::session::Test;
 
 /// Lengths of the bar that differ by no more have the same extension, mm: calibration changes a length by less.
@@ -17,7 +18,7 @@ pub struct Mounting {
 }
 
 /// What has to be done before a test that follows others. `basic_mm` is the length of the bar without an extension.
-pub(super) fn mounting(earlier: &[Test], test: &Test, basic_mm: Option<f64>) -> Mounting {
+pub(super) fn mounting(machine: &Machine, earlier: &[Test], test: &Test, basic_mm: Option<f64>) -> Mounting {
     let mut found = Mounting { words: Vec::new(), mounted: 0, bar_changes: false };
     let last = earlier.last();
     let shared = |of: fn(&Test) -> &str| earlier.iter().rev().find(|other| of(other) == of(test));
@@ -38,7 +39,8 @@ pub(super) fn mounting(earlier: &[Test], test: &Test, basic_mm: Option<f64>) -> 
     for (point, (group, stays)) in test.station.points().iter().zip(groups) {
         if let Some(point) = point {
             let (first, rest) = point.name.split_at(1);
-            note(&format!("{}{rest}", first.to_uppercase()), shared(group), stays);
+            let thing = format!("{}{rest}{}", first.to_uppercase(), point.target.mounted(machine));
+            note(&thing, shared(group), stays);
         }
     }
     if let Some(beside) = test.station.handling().beside {

@@ -93,8 +93,8 @@ fn extension(bar_mm: f64, basic_bar_mm: Option<f64>) -> String {
 
 /// Coordinates of the instrument's points.
 fn points(sheet: &TestSheet) -> Markup {
-    let row = |frame: &str, point: &PlacedPoint| {
-        let mut row: Vec<Cell> = vec![format!("{}, from the {frame}", point.name).into()];
+    let row = |point: &PlacedPoint| {
+        let mut row: Vec<Cell> = vec![format!("{}, from {}", point.name, point.body).into()];
         row.extend(point.own_mm.map(|mm| Cell::fixed(mm, 3)));
         let u = point.u_mm.map_or(String::new(), |u| {
             let um = |mm: &f64| {
@@ -110,8 +110,7 @@ fn points(sheet: &TestSheet) -> Markup {
         row.push(u.into());
         row
     };
-    let on_table = sheet.table_point.iter().map(|point| row("table", point));
-    let rows: Vec<Vec<Cell>> = on_table.chain(sheet.tool_point.iter().map(|point| row("tool", point))).collect();
+    let rows: Vec<Vec<Cell>> = sheet.table_point.iter().chain(&sheet.tool_point).map(row).collect();
     if rows.is_empty() {
         return html! {};
     }

@@ -6,7 +6,7 @@ use abbe::identify::fit;
 use abbe::identify::model_file::{IdentifiedModel, Provenance};
 use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulation, simulate};
-use abbe::model::chain::{ERRORS_PER_AXIS, Machine};
+use abbe::model::chain::{ERRORS_PER_AXIS, Frame, Machine};
 use abbe::model::frames::Point;
 use abbe::model::session::{Prior, Session};
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -189,7 +189,11 @@ fn error_vector(machine: &Machine, tool_mm: [f64; 3], positions: &[f64], errors:
     let point = |errors: &[(usize, f64)]| {
         let of = |slot: usize| errors.iter().find(|(own, _)| *own == slot).map_or(0.0, |(_, value)| *value);
         let bodies = machine.body_errors(|slot| of(slot) != 0.0, of);
-        Vector3::from(machine.table_point(&state, &bodies, machine.tool_point(&state, &bodies, Point(tool_mm))).0)
+        Vector3::from(
+            machine
+                .in_frame(Frame::Table, &state, &bodies, machine.in_r(Frame::Tool, &state, &bodies, Point(tool_mm)))
+                .0,
+        )
     };
     point(errors) - point(&[])
 }

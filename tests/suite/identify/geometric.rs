@@ -65,7 +65,7 @@ fn measured(plan: &Session, errors: &Errors, moved: [f64; 3], noise: Option<(f64
     for test in &mut session.tests {
         let mut readings = planned::planned(&machine, test).unwrap();
         let Station::BallBar(bar) = &test.station else { unreachable!() };
-        let ball: [f64; 3] = std::array::from_fn(|k| bar.workpiece_ball[k] + moved[k]);
+        let ball: [f64; 3] = std::array::from_fn(|k| bar.workpiece_ball.mm[k] + moved[k]);
         for row in 0..readings.rows() {
             let at = |axis: usize| readings.positions[axis][row];
             let turned = |e: [f64; 3], r: [f64; 3], axis: Vector3<f64>, angle: f64| {
@@ -80,7 +80,7 @@ fn measured(plan: &Session, errors: &Errors, moved: [f64; 3], noise: Option<(f64
             let [ex, ey, ra, rb] = errors.c;
             let table = turned([ex, ey, 0.0], [ra, rb, 0.0], Vector3::z(), at(c));
             let workpiece = tilted * (table * Point3::from(ball));
-            let spindle = Point3::from(bar.spindle_ball) + Vector3::new(at(x), at(y), at(z));
+            let spindle = Point3::from(bar.spindle_ball.mm) + Vector3::new(at(x), at(y), at(z));
             let normal: f64 = StandardNormal.sample(&mut random);
             readings.observed[row] = (workpiece - spindle).norm() + noise.map_or(0.0, |(sigma, _)| sigma * normal);
         }
@@ -198,7 +198,7 @@ fn stating_the_true_ball_position_corrects_the_start_angle() {
     let uncorrected = centre(&session, "C100");
     for test in &mut session.tests {
         if let Station::BallBar(bar) = &mut test.station {
-            bar.workpiece_ball[0] += moved[0];
+            bar.workpiece_ball.mm[0] += moved[0];
         }
     }
     let corrected = centre(&session, "C100");

@@ -11,7 +11,7 @@ use abbe::model::chain::Machine;
 use abbe::model::component::ErrorName;
 use abbe::model::frames::{Point, Rotation};
 use abbe::model::instrument::rtest::{Orientation, RTest, Setting};
-use abbe::model::instrument::{InstrumentKind, Station};
+use abbe::model::instrument::{InstrumentKind, Station, Target};
 use abbe::model::sensitivity::{SlotValues, TestModel};
 use abbe::model::session::planned;
 use abbe::model::session::readings::Readings;
@@ -157,8 +157,8 @@ fn both_settings_agree_with_the_plant() {
                 NestOn::Table => Setting::Table,
                 NestOn::Spindle => Setting::Spindle,
             },
-            workpiece_ball: workpiece_ball_mm,
-            spindle_ball: spindle_ball_mm,
+            workpiece_ball: Target::on_table(workpiece_ball_mm),
+            spindle_ball: Target::on_tool(spindle_ball_mm),
             sensors: raw.then(|| nest.directions.map(|direction| direction.into())),
         });
         let of_axis = |name: &str| AxisName::ALL.iter().position(|axis| format!("{axis:?}") == name).unwrap();

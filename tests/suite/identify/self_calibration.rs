@@ -10,8 +10,8 @@ use abbe::identify::self_calibration::{
 };
 use abbe::identify::simulate::{Simulation, simulate};
 use abbe::model::component::ErrorName;
-use abbe::model::instrument::Station;
 use abbe::model::instrument::probe::Probe;
+use abbe::model::instrument::{Station, Target};
 use abbe::model::sensitivity::{SlotValues, TestModel};
 use abbe::model::session::Session;
 use abbe::model::session::motion::Traversals;
@@ -207,10 +207,10 @@ fn touched(session: &mut Session, case: &Touched) {
 fn a_declared_direction_is_the_one_that_is_probed_along() {
     let machine = plan(8, 45.0).machine;
     let station = Station::Probe(Probe {
-        artefact: [10.0, 0.0, 0.0],
+        artefact: Target::on_table([10.0, 0.0, 0.0]),
         axis: [0.0, 0.0, 1.0],
         radius: 45.0,
-        stylus: [0.0; 3],
+        stylus: Target::on_tool([0.0; 3]),
         direction: Some([-0.8, 0.6, 0.0]),
     });
     let mut readings = Readings { positions: vec![vec![0.0]; machine.axes.len()], ..Readings::default() };

@@ -16,9 +16,9 @@ use abbe::model::component::{ErrorKind, ErrorName, Freedom};
 use abbe::model::driver::Driver;
 use abbe::model::effect::shape::Periodic;
 use abbe::model::effect::{Component, Effect, Shape};
-use abbe::model::instrument::Station;
 use abbe::model::instrument::ballbar::BallBar;
 use abbe::model::instrument::rtest::{RTest, Setting};
+use abbe::model::instrument::{Station, Target};
 use abbe::model::sensitivity::{SlotValues, TestModel};
 use abbe::model::session::expression::Length;
 use abbe::model::session::readings::Readings;
@@ -49,15 +49,11 @@ fn session(drawn: &Drawn, balls: &[([f64; 3], [f64; 3])], bar: bool, seed: u64) 
     let machine = &drawn.machine;
     let mut random = Pcg64::seed_from_u64(seed);
     let tests = balls.iter().enumerate().map(|(number, (table, tool))| {
+        let (workpiece_ball, spindle_ball) = (Target::on_table(*table), Target::on_tool(*tool));
         let station = if bar {
-            Station::BallBar(BallBar { workpiece_ball: *table, spindle_ball: *tool, bar: 100.0 })
+            Station::BallBar(BallBar { workpiece_ball, spindle_ball, bar: 100.0 })
         } else {
-            Station::RTest(RTest {
-                setting: Setting::Table,
-                workpiece_ball: *table,
-                spindle_ball: *tool,
-                sensors: None,
-            })
+            Station::RTest(RTest { setting: Setting::Table, workpiece_ball, spindle_ball, sensors: None })
         };
         let rows = RUNS * ROWS_A_RUN;
         let column = |reach: f64, random: &mut Pcg64| -> Vec<f64> {
@@ -208,7 +204,7 @@ proptest! {
         let mut other = session.clone();
         other.machine = Arc::new(machines::mirrored(&session.machine, coordinate));
         for test in &mut other.tests {
-            let mirror = |point: &mut [f64; 3]| point[coordinate] *= -1.0;
+            let mirror = |point: &mut Target<f64>| point.mm[coordinate] *= -1.0;
             match &mut test.station {
                 Station::BallBar(bar) => {
                     mirror(&mut bar.workpiece_ball);

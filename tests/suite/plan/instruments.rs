@@ -370,7 +370,7 @@ fn an_r_test_follows_the_axis_that_no_test_moves() {
             let spindle: [f64; 3] = [at("X"), at("Y"), at("Z")];
             let from_axis = [spindle[0] - 12e-3, spindle[1] + 8e-3, spindle[2]];
             let in_table = turned(-at("C"), from_axis);
-            (0..3).map(|i| in_table[i] + nest.spindle_ball[i] - nest.workpiece_ball[i]).collect()
+            (0..3).map(|i| in_table[i] + nest.spindle_ball.mm[i] - nest.workpiece_ball.mm[i]).collect()
         },
         noise: [5e-4, 0.0],
         azimuth: None,
@@ -391,8 +391,8 @@ fn a_probe_touches_while_the_axis_turns_that_no_test_moves() {
         lacks: &[("EX0C", 12e-3), ("EY0C", -8e-3)],
         reading: |test, at| {
             let Station::Probe(probe) = &test.station else { panic!("a probe") };
-            let stylus: [f64; 3] = std::array::from_fn(|i| at(["X", "Y", "Z"][i]) + probe.stylus[i]);
-            let nominal = turned(at("C"), probe.artefact);
+            let stylus: [f64; 3] = std::array::from_fn(|i| at(["X", "Y", "Z"][i]) + probe.stylus.mm[i]);
+            let nominal = turned(at("C"), probe.artefact.mm);
             let centre = [nominal[0] + 12e-3, nominal[1] - 8e-3];
             let (dx, dy) = (nominal[0] - stylus[0], nominal[1] - stylus[1]);
             let ahead = [dx / dx.hypot(dy), dy / dx.hypot(dy)];

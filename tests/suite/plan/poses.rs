@@ -75,14 +75,14 @@ fn predicted_uncertainties_are_those_of_simulated_readings() {
         .map(|axis| found.poses.iter().map(|pose| pose[axis].to_radians()).collect())
         .collect();
     let nominal: Vec<f64> = {
-        use abbe::model::chain::{AxisPosition, BodyErrors};
+        use abbe::model::chain::{AxisPosition, BodyErrors, Frame};
         use abbe::model::frames::Point;
         let machine = &session.machine;
         let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
         let of = |row: usize| {
             let state: Vec<_> =
                 machine.axes.iter().zip(&positions).map(|(axis, q)| AxisPosition::new(axis.kind, q[row])).collect();
-            machine.tool_point::<f64>(&state, &none, Point(session.tests[0].station.tool_point_mm())).0
+            machine.in_r::<f64>(Frame::Tool, &state, &none, Point(session.tests[0].station.tool_point().mm)).0
         };
         (0..found.poses.len()).flat_map(of).collect()
     };

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use abbe_model::axis::AxisKind;
-use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
+use abbe_model::chain::{AxisPosition, BodyErrors, Frame, Machine};
 use abbe_model::frames::Point;
 use nalgebra::{DVector, Matrix3xX, Vector3};
 use rand::RngExt;
@@ -57,7 +57,7 @@ pub fn write(folder: &Path, session: &Path) {
 fn tool_point(machine: &Machine, joints: &DVector<f64>, point: Vector3<f64>) -> Vector3<f64> {
     let state: Vec<_> = joints.iter().map(|q| AxisPosition::new(AxisKind::Rotary, *q)).collect();
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
-    Vector3::from(machine.tool_point(&state, &none, Point(point.into())).0)
+    Vector3::from(machine.in_r(Frame::Tool, &state, &none, Point(point.into())).0)
 }
 
 /// Moves the joints by the smallest change that brings the point to its place, by Newton's method. Returns `false` if

@@ -34,8 +34,8 @@ pub(super) fn balls(session: &Session) -> Vec<Hypothesis> {
                 let mut changed = session.clone();
                 let mut stated_mm = None;
                 for test in changed.tests.iter_mut().filter(|test| members.contains(&group(test))) {
-                    let Some([workpiece, spindle]) = test.station.balls_mut() else { continue };
-                    let ball = if of_workpiece { workpiece } else { spindle };
+                    let [Some(workpiece), Some(spindle)] = test.station.points_mut() else { continue };
+                    let ball = &mut (if of_workpiece { workpiece } else { spindle }).mm;
                     if ball[i].abs() > ZERO_MM {
                         stated_mm = stated_mm.or(Some(ball[i]));
                         ball[i] = -ball[i];

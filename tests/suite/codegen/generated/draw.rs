@@ -75,7 +75,7 @@ pub fn draw(code: &str, plan: &Session, seed: u64, noise_um: f64) -> DrawnSessio
                 let axis = plan.machine.axis_index(&letter.to_string()).unwrap();
                 readings.positions[axis][row]
             };
-            let mut length = chain.reading_mm(&position, stated.workpiece_ball, stated.spindle_ball, &out);
+            let mut length = chain.reading_mm(&position, stated.workpiece_ball.mm, stated.spindle_ball.mm, &out);
             if noise_um > 0.0 {
                 let resolution = plan.resolution_mm.unwrap();
                 length = ((length + noise_um * 1e-3 * normal()) / resolution).round() * resolution;

@@ -101,7 +101,7 @@ fn check_described_once(code: &str, plan: &Session, written: &str) {
                 *still &= readings.positions[axis][row] == readings.positions[axis][0];
             }
             let none = ChainErrors::default();
-            let length = chain.reading_mm(&position, stated.workpiece_ball, stated.spindle_ball, &none);
+            let length = chain.reading_mm(&position, stated.workpiece_ball.mm, stated.spindle_ball.mm, &none);
             assert!((length - stated.bar).abs() < 1e-9, "{code} {}: {length} at reading {row}", test.name);
         }
         // Every stationary axis is at the position that the file states.

@@ -3,7 +3,7 @@
 use super::*;
 
 /// A refusal with what to do.
-fn refusal(folder: &Folder, text: &str) -> String {
+pub(super) fn refusal(folder: &Folder, text: &str) -> String {
     folder.write("session.toml", text);
     let fault = files::session(&folder.0.path().join("session.toml"), &ReadOptions::default()).unwrap_err();
     format!("{fault}; {}", fault.help().unwrap_or_default())

@@ -1,6 +1,7 @@
 //! Lasers, sensors of angles, distances and pointing against the plant: the readings at large errors, the estimates over
 //! many simulated sessions, and sessions of several instruments.
 
+mod bodies;
 mod bundled;
 mod columns;
 mod diagonals;
@@ -13,17 +14,19 @@ mod stands;
 use abbe::files::{self, ReadOptions};
 use abbe::identify::fit::{self, prepare};
 use abbe::model::axis::AxisKind;
-use abbe::model::chain::{AxisPosition, BodyErrors, Machine};
+use abbe::model::chain::{AxisPosition, BodyErrors, Frame, Machine};
 use abbe::model::instrument::angle::Angle;
+use abbe::model::instrument::ballbar::BallBar;
 use abbe::model::instrument::column::Quantity;
-use abbe::model::instrument::distance::{Distance, StationFrame};
+use abbe::model::instrument::distance::Distance;
 use abbe::model::instrument::laser::Laser;
 use abbe::model::instrument::pointing::Pointing;
-use abbe::model::instrument::{Geometry, Station};
+use abbe::model::instrument::rtest::{RTest, Setting};
+use abbe::model::instrument::{Geometry, Station, Target};
 use abbe::model::rotation_error::Body;
 use abbe::model::session::Session;
 use nalgebra::{UnitQuaternion, Vector3};
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
@@ -60,20 +63,24 @@ impl State {
 
     /// The rotation vector of a frame in addition to the commanded one, in R.
     fn rotation(&self, body: Body) -> Vector3<f64> {
-        let from_commanded =
-            |[commanded, actual]: [Pose; 2]| -> UnitQuaternion<f64> { actual.turn * commanded.turn.inverse() };
-        let (table, tool) = (from_commanded(self.table), from_commanded(self.tool));
+        let bed = [Pose::identity(); 2];
         match body {
-            Body::Relative => tool * table.inverse(),
-            Body::Tool => tool,
-            Body::Table => table,
+            Body::Relative => rotation(self.tool, self.table),
+            Body::Tool => rotation(self.tool, bed),
+            Body::Table => rotation(self.table, bed),
         }
-        .scaled_axis()
     }
 }
 
+/// The rotation vector of a body against another in addition to the commanded one, in R. Poses are commanded and actual.
+fn rotation(body: [Pose; 2], against: [Pose; 2]) -> Vector3<f64> {
+    let [body, against] =
+        [body, against].map(|[commanded, actual]| -> UnitQuaternion<f64> { actual.turn * commanded.turn.inverse() });
+    (body * against.inverse()).scaled_axis()
+}
+
 /// A laser that reads all channels.
-fn laser(reflector: [f64; 3], optic: [f64; 3], frame: [[f64; 3]; 3]) -> Laser<f64> {
+fn laser(reflector: Target<f64>, optic: Target<f64>, frame: [[f64; 3]; 3]) -> Laser<f64> {
     let mut laser = Laser { reflector, optic, frame, channels: Vec::new(), is_beam_stated: false, datum: 0.0 };
     laser.keep_channels(&|quantity| matches!(quantity, Quantity::Channel(_)));
     laser
@@ -87,6 +94,8 @@ struct Large {
     state: Vec<AxisPosition<f64>>,
     errors: Vec<BodyErrors<f64>>,
     unknowns: Vec<f64>,
+    /// Every body, with its pose as commanded and actually.
+    frames: Vec<(Frame, [Pose; 2])>,
 }
 
 impl Large {
@@ -102,10 +111,21 @@ impl Large {
             .collect();
         let index = |letter: char| machine.axis_index(&letter.to_string()).unwrap();
         let plant = State::of(chain, &|letter| positions[index(letter)], &|letter| sizes[index(letter)]);
+        let bed = (Frame::Bed, [Pose::identity(); 2]);
+        let mut frames = vec![(Frame::Table, plant.table), (Frame::Tool, plant.tool), bed];
+        for side in [&chain.workpiece_side, &chain.tool_side] {
+            for (k, link) in side.iter().enumerate() {
+                // The body of an axis is the last one of a shorter side.
+                let shorter = Chain { workpiece_side: side[..=k].to_vec(), tool_side: Vec::new() };
+                let body =
+                    State::of(&shorter, &|letter| positions[index(letter)], &|letter| sizes[index(letter)]).table;
+                frames.push((Frame::Axis(index(link.letter)), body));
+            }
+        }
         let state = machine.axes.iter().zip(&positions).map(|(axis, q)| AxisPosition::new(axis.kind, *q)).collect();
         let errors = machine.body_errors(|_| true, |slot| sizes[slot / 12][slot % 12 / 6][slot % 6]);
         let unknowns = (0..14).map(|_| uniform(random, 1e-3)).collect();
-        Large { machine: machine.clone(), plant, state, errors, unknowns }
+        Large { machine: machine.clone(), plant, state, errors, unknowns, frames }
     }
 
     /// The reading of the model.
@@ -140,19 +160,41 @@ fn readings_at_large_errors_are_those_of_the_plant() {
             let (read, moved) = (|station: &Station<f64>| large.read(station), |mm, first| large.moved(mm, first));
             let point = |random: &mut Pcg64| -> [f64; 3] { std::array::from_fn(|_| uniform(random, 200.0)) };
             let (tool_mm, table_mm) = (point(&mut random), point(&mut random));
+            // The points are on table and tool, or on any two bodies.
+            let mut any = || large.frames[random.random_range(0..large.frames.len())];
+            for [(of_tool, tool), (of_table, table)] in [[large.frames[1], large.frames[0]], [any(), any()]] {
+                let (on_tool, on_table) =
+                    (Target { frame: of_tool, mm: tool_mm }, Target { frame: of_table, mm: table_mm });
 
-            // The beam, turned towards horizontal and vertical, and the directions perpendicular to it.
-            let frame = [[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]];
-            let found = read(&Station::Laser(laser(tool_mm, table_mm, frame)));
-            let [beam, horizontal, vertical] = frame.map(Vector3::from);
-            let turned = (beam + horizontal * unknowns[6] + vertical * unknowns[7]).normalize();
-            let across = |direction: Vector3<f64>| (direction - turned * turned.dot(&direction)).normalize();
-            let from_optic = plant.tool[1].apply(moved(tool_mm, 0)) - plant.table[1].apply(moved(table_mm, 3));
-            let rotation = plant.rotation(Body::Relative);
-            let mut expected = [turned, across(horizontal), across(vertical)].map(|d| d.dot(&from_optic)).to_vec();
-            expected.extend([horizontal, vertical, beam].map(|d| d.dot(&rotation)));
-            expected.iter_mut().zip(&unknowns[8..]).for_each(|(value, zero)| *value += zero);
-            near(&found, &expected, "laser");
+                // The beam, turned towards horizontal and vertical, and the directions perpendicular to it.
+                let frame = [[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]];
+                let found = read(&Station::Laser(laser(on_tool, on_table, frame)));
+                let [beam, horizontal, vertical] = frame.map(Vector3::from);
+                let turned = (beam + horizontal * unknowns[6] + vertical * unknowns[7]).normalize();
+                let across = |direction: Vector3<f64>| (direction - turned * turned.dot(&direction)).normalize();
+                let from_optic = tool[1].apply(moved(tool_mm, 0)) - table[1].apply(moved(table_mm, 3));
+                let rotation = rotation(tool, table);
+                let mut expected = [turned, across(horizontal), across(vertical)].map(|d| d.dot(&from_optic)).to_vec();
+                expected.extend([horizontal, vertical, beam].map(|d| d.dot(&rotation)));
+                expected.iter_mut().zip(&unknowns[8..]).for_each(|(value, zero)| *value += zero);
+                near(&found, &expected, "laser");
+
+                let found = read(&Station::Distance(Distance { station: on_table, reflector: on_tool }));
+                let apart = tool[1].apply(moved(tool_mm, 3)) - table[1].apply(moved(table_mm, 0));
+                near(&found, &[apart.norm() + unknowns[6]], "distance");
+
+                let bar = BallBar { workpiece_ball: on_table, spindle_ball: on_tool, bar: 100.0 };
+                let length = apart.norm() - unknowns[6] + unknowns[7] * (apart.norm() - 100.0);
+                near(&read(&Station::BallBar(bar)), &[length], "ball bar");
+
+                for (setting, nest) in [(Setting::Table, table), (Setting::Spindle, tool)] {
+                    let nominal = RTest { setting, workpiece_ball: on_table, spindle_ball: on_tool, sensors: None };
+                    let found = Station::RTest(nominal)
+                        .read::<f64>(&machine, state, &large.errors, |k| (k < 6).then_some(unknowns[k]));
+                    let expected = nest[1].turn.inverse() * apart;
+                    near(found.channels(), expected.as_slice(), "R-test");
+                }
+            }
 
             for body in [Body::Relative, Body::Tool, Body::Table] {
                 let about = vec![[0.0, 0.6, 0.8], [1.0, 0.0, 0.0]];
@@ -164,14 +206,6 @@ fn readings_at_large_errors_are_those_of_the_plant() {
                     .map(|(about, zero)| Vector3::from(*about).dot(&rotation) + zero)
                     .collect();
                 near(&found, &expected, "angle");
-            }
-
-            for frame in [StationFrame::Table, StationFrame::Bed] {
-                let found = read(&Station::Distance(Distance { station: table_mm, reflector: tool_mm, frame }));
-                let station = moved(table_mm, 0);
-                let station = if frame == StationFrame::Table { plant.table[1].apply(station) } else { station };
-                let expected = (plant.tool[1].apply(moved(tool_mm, 3)) - station).norm() + unknowns[6];
-                near(&found, &[expected], "distance");
             }
 
             // Azimuth and elevation of the line of sight, from true to columns and back to channels.

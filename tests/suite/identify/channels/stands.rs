@@ -33,13 +33,16 @@ fn readings_beside_the_machine_are_those_of_the_plant() {
             // A few metres away, so that the line of sight is never vertical.
             let stand = Pose { shift_mm: stand.shift_mm + Vector3::new(4000.0, 0.0, 0.0), ..stand };
             let target: [f64; 3] = std::array::from_fn(|_| uniform(&mut random, 200.0));
+            // On any body of the machine.
+            let (frame, carrier) = large.frames[random.random_range(0..large.frames.len())];
             let model = Stand {
                 rotation: std::array::from_fn(|i| std::array::from_fn(|j| stand.turn.to_rotation_matrix()[(i, j)])),
                 origin: stand.shift_mm.into(),
             };
             let off = Pose::displaced(&std::array::from_fn(|k| large.unknowns[k]));
-            let tool = stand.then_inner(off).then_inner(large.plant.tool[1]);
+            let tool = stand.then_inner(off).then_inner(carrier[1]);
             let seen = tool.apply(large.moved(target, 6));
+            let target = Target { frame, mm: target };
             let tracker = |is_polar| Station::Tracker(Tracker { target, stand: model.clone(), is_polar });
             near(&large.read(&tracker(false)), seen.as_slice(), "tracker");
 

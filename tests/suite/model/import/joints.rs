@@ -2,7 +2,7 @@
 
 use abbe::files::{self, ReadOptions};
 use abbe::identify::start::with_targets;
-use abbe::model::chain::{AxisPosition, BodyErrors};
+use abbe::model::chain::{AxisPosition, BodyErrors, Frame};
 use abbe::model::frames::Point;
 use std::sync::Arc;
 
@@ -40,7 +40,7 @@ fn columns_have_the_names_of_the_robots_own_joints() {
             let state: Vec<AxisPosition<f64>> =
                 machine.axes.iter().zip(&q).map(|(axis, q)| AxisPosition::new(axis.kind, *q)).collect();
             let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
-            let at = machine.tool_point(&state, &none, Point([40.0, -30.0, 20.0])).0;
+            let at = machine.in_r(Frame::Tool, &state, &none, Point([40.0, -30.0, 20.0])).0;
             let shown = q.iter().zip(&machine.axes).rev().map(|(q, axis)| match axis.kind {
                 abbe::model::axis::AxisKind::Linear => format!("{q:.6},"),
                 abbe::model::axis::AxisKind::Rotary => format!("{q:.9},"),
@@ -74,7 +74,7 @@ fn a_target_is_found_from_the_rows_with_all_coordinates() {
     let mut readings = session.tests[0].readings.as_deref().unwrap().clone();
     readings.observed[3 * 5] = f64::NAN;
     lacking.tests[0].readings = Some(Arc::new(readings));
-    let point = with_targets(&lacking).tests[0].station.tool_point_mm();
+    let point = with_targets(&lacking).tests[0].station.tool_point().mm;
     // Where the target is in the tool frame: `a_new_test_takes_the_set_up_of_another`.
     let expected = [-1184.3 + 30.0, -256.141 - 80.0, 11.6 - 20.0];
     assert!((0..3).all(|i| (point[i] - expected[i]).abs() < 0.2), "{point:?}");

@@ -340,7 +340,7 @@ fn a_new_test_takes_the_set_up_of_another() {
     // axes are X, -Z and Y there.
     let expected = [-1184.3 + 30.0, -256.141 - 80.0, 11.6 - 20.0];
     for test in &read.tests {
-        let found = test.station.tool_point_mm();
+        let found = test.station.tool_point().mm;
         assert!((0..3).all(|i| (found[i] - expected[i]).abs() < 0.2), "{found:?}");
     }
 }

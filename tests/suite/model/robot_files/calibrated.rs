@@ -6,7 +6,7 @@ use abbe::files::{self, Changes, ReadOptions, with_readings};
 use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulation, simulate};
 use abbe::model::axis::AxisKind;
-use abbe::model::chain::{AxisPosition, Machine};
+use abbe::model::chain::{AxisPosition, Frame, Machine};
 use abbe::model::frames::Point;
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -51,7 +51,7 @@ fn with_errors(machine: &Machine, slots: &[f64], q: &[f64], tool_mm: [f64; 3]) -
     let errors = machine.body_errors(|slot| slots[slot] != 0.0, |slot| slots[slot]);
     let state: Vec<AxisPosition<f64>> =
         machine.axes.iter().zip(q).map(|(axis, q)| AxisPosition::new(axis.kind, *q)).collect();
-    Vector3::from(machine.tool_point(&state, &errors, Point(tool_mm)).0)
+    Vector3::from(machine.in_r(Frame::Tool, &state, &errors, Point(tool_mm)).0)
 }
 
 /// Tracker readings of a robot with errors; fit; the origins in its own file: MuJoCo moves the target as the model does.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use abbe::files::{self, ReadOptions};
 use abbe::model::axis::AxisKind;
-use abbe::model::chain::{AxisPosition, BodyErrors, Machine};
+use abbe::model::chain::{AxisPosition, BodyErrors, Frame, Machine};
 use abbe::model::frames::Point;
 use nalgebra::{Matrix4, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -40,14 +40,14 @@ fn created(place: &Path, name: &str, arguments: &[&str]) -> (Machine, PathBuf) {
 /// A point of the flange in the tool frame of a machine: the target of its plan.
 fn target_mm(folder: &Path) -> [f64; 3] {
     let options = ReadOptions { read_data: false, ..ReadOptions::default() };
-    files::session(&folder.join("plan.toml"), &options).unwrap().tests[0].station.tool_point_mm()
+    files::session(&folder.join("plan.toml"), &options).unwrap().tests[0].station.tool_point().mm
 }
 
 fn point_mm(machine: &Machine, q: &[f64], tool_mm: [f64; 3]) -> Vector3<f64> {
     let state: Vec<AxisPosition<f64>> =
         machine.axes.iter().zip(q).map(|(axis, q)| AxisPosition::new(axis.kind, *q)).collect();
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
-    Vector3::from(machine.tool_point(&state, &none, Point(tool_mm)).0)
+    Vector3::from(machine.in_r(Frame::Tool, &state, &none, Point(tool_mm)).0)
 }
 
 /// Random positions within the travel of the axes, mm and rad.
