@@ -9,7 +9,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use crate::printers::csv;
 use crate::printers::html::{head, list, prose, sections, table};
 use crate::report::block::{Level, Report};
-use crate::report::figure::svg::{DARK, LIGHT, STYLE};
+use crate::report::figure::svg::{STYLE, variables};
 use crate::report::number::capitalised;
 use crate::report::provenance::Provenance;
 use crate::report::table::{Table, cells};
@@ -101,9 +101,7 @@ fn warnings(warnings: &[String]) -> Markup {
 
 /// Colours, then the style sheets of page and plots.
 fn style() -> String {
-    let colours =
-        |list: &[(&str, &str)]| -> String { list.iter().map(|(name, colour)| format!("--{name}:{colour};")).collect() };
-    let (light, dark) = (colours(&LIGHT), colours(&DARK));
+    let [light, dark] = [false, true].map(variables);
     format!(
         ":root{{color-scheme:light dark;{light}}}\n@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n{PAGE_STYLE}{STYLE}"
     )

@@ -11,7 +11,7 @@ use abbe::plan::sheet::TestSheet;
 use maud::{DOCTYPE, Markup, html};
 
 use super::html::head;
-use crate::report::figure::svg::{LIGHT, STYLE};
+use crate::report::figure::svg::{STYLE, variables};
 use crate::report::number::with_minus_signs;
 
 const PAGE_STYLE: &str = include_str!("sheet.css");
@@ -65,8 +65,7 @@ fn named(file: &str, number: Option<u32>) -> String {
 
 /// The sheets of a session as one HTML page.
 pub fn html(session: &Session, sheets: &[TestSheet], order: &Order) -> String {
-    let colours: String = LIGHT.iter().map(|(name, colour)| format!("--{name}:{colour};")).collect();
-    let style = format!(":root{{color-scheme:light;{colours}}}\n{STYLE}{PAGE_STYLE}");
+    let style = format!(":root{{color-scheme:light;{}}}\n{STYLE}{PAGE_STYLE}", variables(false));
     let title = format!("Set-up sheets: {}", session.machine.name);
     let page = html! {
         (DOCTYPE)

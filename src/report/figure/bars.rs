@@ -1,8 +1,9 @@
 //! Horizontal charts with one row per name: values with error bars, and bars.
 
 use abbe::identify::results::MeasuredValue;
+use abbe::model::words::cut;
 
-use super::drawing::{Element, Place, WIDTH, legend, shortened};
+use super::drawing::{Element, Place, WIDTH, legend};
 use super::scale::{Placed, Scale, span, text};
 use super::{Chart, Quantity};
 use crate::report::table::{Cell, Table, cells, numbers, words};
@@ -40,7 +41,7 @@ impl Rows {
     /// Draws the name of a row, `down` below its middle; returns the ordinate of the middle.
     fn name(&mut self, number: usize, name: &str, down: f64) -> f64 {
         let middle = 10.0 + ROW * (number as f64 + 0.5);
-        let shown = shortened(name, MAX_NAME);
+        let shown = cut(name, MAX_NAME);
         self.elements.push(Element::text("right", (NAMES - 10.0, middle + down), shown).titled(name));
         middle
     }

@@ -3,8 +3,9 @@
 use abbe::model::axis::{Axis, AxisKind};
 use abbe::model::chain::Machine;
 use abbe::model::component::ErrorName;
+use abbe::model::words::cut;
 
-use super::drawing::{Element, Place, WIDTH, shortened, wrapped};
+use super::drawing::{Element, Place, WIDTH, wrapped};
 use super::scale::text;
 use super::{Chart, Figure};
 use crate::report::table::{Cell, Table, cells, numbers, words};
@@ -65,7 +66,7 @@ fn chart(bodies: &[Body]) -> Chart {
         }
         elements.extend(lines(body).iter().enumerate().map(|(number, line)| {
             let baseline = y + HEIGHT + 15.0 + 14.0 * number as f64;
-            Element::text("small soft middle", (middle, baseline), shortened(line, 17))
+            Element::text("small soft middle", (middle, baseline), cut(line, 17))
         }));
     }
     Chart::new("chain", [WIDTH, 6.0 + rows as f64 * row_height + last_height], elements, table(bodies))
@@ -115,10 +116,10 @@ fn moving((x, y): Place, axis: &Axis) -> Element {
         |line: Vec<Place>| line.into_iter().map(|(right, down)| (middle + 22.0 + right, y + 20.0 + down)).collect();
     let drawn = vec![
         Element::rectangle("body", (x, y), [BODY, HEIGHT]).rounded(4.0),
-        Element::text("title", (x + 9.0, y + 24.0), shortened(&axis.name, 5)),
+        Element::text("title", (x + 9.0, y + 24.0), cut(&axis.name, 5)),
         Element::lines("motion", arrow.into_iter().map(placed)),
-        Element::text("small soft middle", (middle, y + 50.0), format!("d {}", shortened(&direction, 13))),
-        Element::text("small soft middle", (middle, y + 66.0), format!("o {}", shortened(&origin, 13))),
+        Element::text("small soft middle", (middle, y + 50.0), format!("d {}", cut(&direction, 13))),
+        Element::text("small soft middle", (middle, y + 66.0), format!("o {}", cut(&origin, 13))),
     ];
     let title = format!("{}: direction {direction}, origin {origin} mm", axis.name);
     Element::group((0.0, 0.0), drawn).titled(title)

@@ -143,22 +143,13 @@ pub fn wrapped(text: &str, max: usize) -> Vec<String> {
     lines
 }
 
-/// Shortens text to at most `max` characters, with an ellipsis.
-pub fn shortened(text: &str, max: usize) -> String {
-    if text.chars().count() <= max {
-        return text.to_string();
-    }
-    let kept: String = text.chars().take(max.saturating_sub(1)).collect();
-    format!("{kept}…")
-}
-
 /// Greatest width of a letter of a drawing, SVG units: widths of text are estimated generously.
 const LETTER: f64 = 7.8;
 /// Height of a letter above its line.
 const ASCENT: f64 = 11.0;
 
 /// A label beside a point, placed so that all of it is within a drawing of this size.
-pub fn label(class: &str, (x, y): Place, text: String, [width, height]: [f64; 2]) -> Element {
+pub fn label(class: &str, (x, y): Place, text: &str, [width, height]: [f64; 2]) -> Element {
     let last = width - LETTER * text.chars().count() as f64;
     Element::text(class, (x.min(last).max(0.0), y.min(height).max(ASCENT)), text)
 }

@@ -1,8 +1,10 @@
 //! Charts with two straight axes: lines, dots, stems, ranges and flags.
 
+use abbe::model::words::cut;
+
 use serde_json::json;
 
-use super::drawing::{Element, Place, WIDTH, legend, shortened};
+use super::drawing::{Element, Place, WIDTH, legend};
 use super::scale::{Placed, Scale};
 use super::{Chart, Quantity};
 use crate::report::table::{Cell, Table, cells, numbers, words};
@@ -180,7 +182,7 @@ impl Series {
                 elements.push(Element::line("found-line", pole));
                 elements
                     .push(Element::line("found", [(at, bottom), (at - 4.0, bottom + 8.0), (at + 4.0, bottom + 8.0)]));
-                let name = shortened(&flag.text, 24);
+                let name = cut(&flag.text, 24);
                 elements.push(Element::text(class, (at + beside, baseline), name).titled(&flag.text));
             }
             return elements;
@@ -190,7 +192,7 @@ impl Series {
             let (at, top) = (x.at(*at), y.at(*top));
             let title = format!("{}: {}", dot.text, dot.note);
             elements.push(Element::circle(format!("dot-{}", self.class), (at, top), 3.4).titled(title));
-            let name = dot.shown.then(|| shortened(&dot.text, 26));
+            let name = dot.shown.then(|| cut(&dot.text, 26));
             elements.extend(name.map(|name| Element::text("small", (at + 6.0, top - 7.0), name)));
         }
         elements

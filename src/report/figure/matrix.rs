@@ -1,7 +1,9 @@
 //! Maps of symmetric matrices. Colour and shape both show the sign, so that the map is legible in grey.
 
+use abbe::model::words::cut;
+
 use super::Chart;
-use super::drawing::{Element, WIDTH, shortened};
+use super::drawing::{Element, WIDTH};
 use super::scale::text;
 use crate::report::table::{Cell, Table, cells, numbers, words};
 
@@ -23,8 +25,8 @@ pub fn matrix(quantity: &str, ids: &[String], rows: &[Vec<Option<f64>>]) -> Char
     let mut elements = Vec::new();
     for (i, id) in ids.iter().enumerate() {
         let line = names + cell * (i as f64 + 0.5) + font_px * 0.35;
-        let name = shortened(id, MAX_NAME);
-        elements.push(Element::text("right", (names - 6.0, line), &name).sized(font_px).titled(id));
+        let name = cut(id, MAX_NAME);
+        elements.push(Element::text("right", (names - 6.0, line), name.clone()).sized(font_px).titled(id));
         elements.push(Element::upwards("", (line, names - 6.0), name).sized(font_px));
     }
     elements.push(Element::rectangle("frame", (names, names), [side; 2]));

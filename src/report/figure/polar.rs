@@ -1,8 +1,10 @@
 //! Polar charts: the deviation of a ball bar, magnified, about a nominal circle.
 
+use abbe::model::words::cut;
+
 use serde_json::json;
 
-use super::drawing::{Element, Place, WIDTH, legend, shortened};
+use super::drawing::{Element, Place, WIDTH, legend};
 use super::lines::{self, Series};
 use super::scale::{round_up, text};
 use super::{Chart, Quantity};
@@ -140,7 +142,7 @@ pub fn panels([angle, deviation]: [&Quantity; 2], um: f64, series: &[Series]) ->
     let row_height = side + 22.0;
     let panel = |(number, series): (usize, &Series)| {
         let mut elements = circles.elements(std::slice::from_ref(series));
-        elements.push(Element::text("middle", (side / 2.0, side + 8.0), shortened(&series.label, 26)));
+        elements.push(Element::text("middle", (side / 2.0, side + 8.0), cut(&series.label, 26)));
         Element::group(((number % PER_ROW) as f64 * side, (number / PER_ROW) as f64 * row_height), elements)
     };
     let elements = series.iter().enumerate().map(panel).collect();

@@ -5,9 +5,10 @@ use abbe::identify::series::paths::SetUpPath;
 use abbe::model::axis::AxisKind;
 use abbe::model::body::BodyShape;
 use abbe::model::chain::Machine;
+use abbe::model::words::cut;
 
 use super::Chart;
-use super::drawing::{Element, Place, label, legend, shortened};
+use super::drawing::{Element, Place, label, legend};
 use super::scale::span;
 use crate::report::table::{Cell, Table, cells, numbers, words};
 
@@ -65,7 +66,7 @@ impl Paper {
     /// Words beside a point.
     fn label(&self, class: &str, words: &str, max: usize, point: Point, [right, down]: [f64; 2]) -> Element {
         let (x, y) = self.at(point);
-        label(class, (x + right, y + down), shortened(words, max), self.size)
+        label(class, (x + right, y + down), &cut(words, max), self.size)
     }
 }
 
@@ -229,6 +230,6 @@ fn set_up(path: &SetUpPath, side: f64) -> Vec<Element> {
     }
     let balls = starts.into_iter().zip(["dot-before", "dot-after"]);
     elements.extend(balls.filter_map(|(at, class)| Some(paper.circle(class, *at?, 4.0))));
-    elements.push(Element::text("middle", (side / 2.0, side + 4.0), shortened(&path.test, 26)));
+    elements.push(Element::text("middle", (side / 2.0, side + 4.0), cut(&path.test, 26)));
     elements
 }

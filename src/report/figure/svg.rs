@@ -112,40 +112,30 @@ fn path(lines: &[Vec<Place>]) -> String {
 /// Replaces CSS variables by the light colours, because many SVG programs do not support variables.
 pub(super) fn light_style() -> String {
     let mut style = STYLE.to_string();
-    for (name, colour) in LIGHT {
-        style = style.replace(&format!("var(--{name})"), colour);
+    for (name, light, _) in COLOURS {
+        style = style.replace(&format!("var(--{name})"), light);
     }
     style
 }
 
-/// Colours for print and light screens: the palette of Okabe and Ito, suited to colour-blind readers.
-pub const LIGHT: [(&str, &str); 12] = [
-    ("paper", "#ffffff"),
-    ("ink", "#1b1b1b"),
-    ("soft", "#595959"),
-    ("grid", "#d5d5d5"),
-    ("forward", "#0072b2"),
-    ("backward", "#d55e00"),
-    ("before", "#d55e00"),
-    ("after", "#0072b2"),
-    ("mark", "#007a5a"),
-    ("other", "#b4b4b4"),
-    ("third", "#aa4499"),
-    ("fourth", "#8a6d00"),
+/// Colours by name, for print and light screens, and for dark screens: the palette of Okabe and Ito, suited to colour-blind
+/// readers.
+const COLOURS: [(&str, &str, &str); 12] = [
+    ("paper", "#ffffff", "#16181b"),
+    ("ink", "#1b1b1b", "#ececec"),
+    ("soft", "#595959", "#b0b0b0"),
+    ("grid", "#d5d5d5", "#3d4147"),
+    ("forward", "#0072b2", "#56b4e9"),
+    ("backward", "#d55e00", "#ff9142"),
+    ("before", "#d55e00", "#ff9142"),
+    ("after", "#0072b2", "#56b4e9"),
+    ("mark", "#007a5a", "#2fc79a"),
+    ("other", "#b4b4b4", "#6a6f76"),
+    ("third", "#aa4499", "#e59ad2"),
+    ("fourth", "#8a6d00", "#f0e442"),
 ];
 
-/// Colours for dark screens.
-pub const DARK: [(&str, &str); 12] = [
-    ("paper", "#16181b"),
-    ("ink", "#ececec"),
-    ("soft", "#b0b0b0"),
-    ("grid", "#3d4147"),
-    ("forward", "#56b4e9"),
-    ("backward", "#ff9142"),
-    ("before", "#ff9142"),
-    ("after", "#56b4e9"),
-    ("mark", "#2fc79a"),
-    ("other", "#6a6f76"),
-    ("third", "#e59ad2"),
-    ("fourth", "#f0e442"),
-];
+/// The colours as variables of a style sheet, of a dark screen or else of a light one and of print.
+pub fn variables(is_dark: bool) -> String {
+    COLOURS.iter().map(|(name, light, dark)| format!("--{name}:{};", if is_dark { dark } else { light })).collect()
+}

@@ -7,12 +7,11 @@ use abbe::identify::series::spectrum::Spectrum;
 use abbe::model::Diagnostic;
 use abbe::model::effect::shape::Harmonic;
 use abbe::model::effect::{Effect, Shape};
-use abbe::model::words::counted;
+use abbe::model::words::{counted, cut};
 
 use super::decimate;
 use super::plots::{MAX_TESTS, SessionPlots};
 use crate::report::figure::bars::{NAMED, bars};
-use crate::report::figure::drawing::shortened;
 use crate::report::figure::lines::{Axis, Lines, Mark, Name, Series};
 use crate::report::figure::polar::panels;
 use crate::report::figure::scale::{Scale, span, text};
@@ -268,7 +267,7 @@ fn curves(test: &TestSensitivities, columns: &[Sensitivity]) -> Figure {
         let values: Vec<f64> = column.values.iter().map(|value| value * amount).collect();
         let most = values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
         let is_same = |other: &[f64]| other.iter().zip(&values).all(|(a, b)| (a - b).abs() <= SAME_SHARE * most);
-        let name = shortened(&column.id, 20);
+        let name = cut(&column.id, 20).into_owned();
         match found.iter_mut().find(|(_, other, curve)| *other == size && is_same(curve)) {
             Some((names, ..)) => *names = format!("{names}, {name}"),
             None => found.push((name, size, values)),
