@@ -95,9 +95,9 @@ pub(super) fn tests(
         Data::Columns(columns) => memory::read(columns, &request)?,
         _ => {
             let named = document.data.as_deref().unwrap_or_default();
-            let data = table::read(&data_file(context, named).within("data")?, &request)?;
-            found.stamps.push(data.stamp);
-            Filling { by_socket: data.by_socket, quantities: data.quantities, warnings: data.warnings }
+            let (stamp, filling) = table::read(&data_file(context, named).within("data")?, &request)?;
+            found.stamps.push(stamp);
+            filling
         }
     };
     let has = |quantity| quantities.contains(&quantity);

@@ -6,6 +6,7 @@ use abbe_model::axis::AxisKind;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::chain::{Chain, Joint};
+use crate::table::csv::decimal;
 
 /// How the robot is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,8 +30,6 @@ const STEPS: f64 = 20.0;
 const LEAST_WHOLE: f64 = 2.0;
 /// Position of the joints that a test holds, rad: away from the stretched arm.
 const HELD_RAD: f64 = 0.4;
-/// Places of a written number: a length to 1e-12 mm.
-const PLACES: usize = 12;
 /// Number of sockets in a plan.
 const SOCKETS: usize = 3;
 
@@ -45,15 +44,8 @@ fn axis(joint: usize) -> String {
     format!("J{}", joint + 1)
 }
 
-/// A number without the residue of rounding.
-fn number(value: f64) -> String {
-    let text = format!("{value:.PLACES$}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".into() } else { text.into() }
-}
-
 fn list(values: [f64; 3]) -> String {
-    format!("[{}]", values.map(number).join(", "))
+    format!("[{}]", values.map(decimal).join(", "))
 }
 
 /// A text on one line, for comments and quotes.
@@ -92,7 +84,7 @@ fn machine(chain: &Chain, source: &str) -> String {
             list(point.into())
         );
         if let Some(ends) = joint.travel {
-            let ends = ends.map(|end| self::number(joint.kind.to_display(end)));
+            let ends = ends.map(|end| decimal(joint.kind.to_display(end)));
             let _ = writeln!(text, "{unit} = [{}]", ends.join(", "));
         }
     }
@@ -180,16 +172,16 @@ fn tracker(chain: &Chain, point: &str, target_mm: [f64; 3], columns: &[String]) 
         let step = (to - from) / STEPS;
         let others = (0..chain.joints.len())
             .filter(|other| *other != number)
-            .map(|other| format!("{} = {}", columns[other], self::number(held_to_display(chain, other))));
+            .map(|other| format!("{} = {}", columns[other], decimal(held_to_display(chain, other))));
         let _ = write!(
             text,
             "\n[[test]]\nname = \"{name}\"\n# The target in the tool frame, which lies in the frame of the base with all joints at zero.\n\
              target_mm = {point}\ntarget_u_um = inf\nsetup = \"tracker\"\nspindle_setup = \"target\"\nat = {{ {} }}\n\
              sweep = {{ axis = \"{name}\", from_{unit} = {}, to_{unit} = {}, step_{unit} = {}, {feed}, runs = 1 }}\n",
             others.collect::<Vec<_>>().join(", "),
-            self::number(from),
-            self::number(to),
-            self::number(step),
+            decimal(from),
+            decimal(to),
+            decimal(step),
         );
     }
     text

@@ -14,10 +14,11 @@ use abbe_model::session::readings::Readings;
 use abbe_model::unit::Unit;
 
 use super::comment::is_comment;
-use super::format::{Content, DataFormat, Rows, Table};
+use super::format::{Content, DataFormat, Rows};
 use super::lines::Lines;
 use super::request::Request;
 use super::row::Row;
+use crate::stamp::FileStamp;
 use crate::store::Store;
 
 /// The format. It reads every file that is of no other format.
@@ -28,13 +29,11 @@ impl DataFormat for Csv {
         true
     }
 
-    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, Diagnostic> {
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<(FileStamp, Content), Diagnostic> {
         let lines = Lines::open(request.store, file, &request.format)?;
-        Ok(Content::Table(Table {
-            stamp: lines.stamp().clone(),
-            has_header: request.format.header,
-            rows: Box::new(CsvRows::new(lines, request.format.separator)),
-        }))
+        let (stamp, has_header) = (lines.stamp().clone(), request.format.header);
+        let rows = Box::new(CsvRows::new(lines, request.format.separator));
+        Ok((stamp, Content::Table { rows, has_header }))
     }
 }
 
@@ -181,7 +180,7 @@ fn unit_of(column: &Column) -> Unit {
 }
 
 /// A number with the necessary decimals, at most twelve.
-fn decimal(value: f64) -> String {
+pub(crate) fn decimal(value: f64) -> String {
     let text = format!("{value:.12}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".into() } else { text.into() }

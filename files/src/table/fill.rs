@@ -166,7 +166,7 @@ pub(super) fn read(
         _ => Ok(Filling {
             quantities: columns::quantities(&filled.columns),
             by_socket: filled.by_socket(Some(file)),
-            warnings,
+            warnings: request.named(warnings),
         }),
     }
 }

@@ -6,8 +6,8 @@ use std::io::Read;
 use std::path::Path;
 
 use abbe_model::Diagnostic;
-use abbe_model::session::readings::Readings;
 
+use super::fill::Filling;
 use super::request::Request;
 use super::row::Row;
 use crate::stamp::FileStamp;
@@ -18,29 +18,19 @@ pub(super) trait DataFormat: Sync {
     /// Whether the format reads this file: by its extension or its first bytes.
     fn reads(&self, file: &Path, store: &Store) -> bool;
 
-    /// Opens the file and returns its rows, or its readings if they are more than a table.
+    /// Opens the file and returns its state and its rows, or its readings if they are more than a table.
     ///
     /// # Errors
     /// If the file cannot be opened or is not of this format, with its location and what to do.
-    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, Diagnostic>;
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<(FileStamp, Content), Diagnostic>;
 }
 
 /// The content of a data file.
 pub(super) enum Content {
-    /// Rows of cells, which become readings by the roles of their columns.
-    Table(Table),
+    /// Rows of cells, which become readings by the roles of their columns; the first may name the columns.
+    Table { rows: Box<dyn Rows>, has_header: bool },
     /// Readings that the format itself interprets.
-    Readings(Box<WholeReadings>),
-}
-
-/// Rows of cells.
-pub(super) struct Table {
-    /// The state of the file.
-    pub stamp: FileStamp,
-    /// Whether the first row names the columns.
-    pub has_header: bool,
-    /// The rows.
-    pub rows: Box<dyn Rows>,
+    Readings(Filling),
 }
 
 /// The rows of a file, one after another. All have the same number of cells.
@@ -53,16 +43,6 @@ pub(super) trait Rows {
 
     /// Takes a row that is no longer needed, so that the next one can use its memory: a file has millions of them.
     fn reuse(&mut self, _: Row) {}
-}
-
-/// Readings with all their columns.
-pub(super) struct WholeReadings {
-    /// The state of the file.
-    pub stamp: FileStamp,
-    /// The readings.
-    pub readings: Readings,
-    /// Warnings about the file, complete with its name.
-    pub warnings: Vec<String>,
 }
 
 /// Whether the name of a file ends in one of these extensions, in any case.

@@ -9,10 +9,11 @@ use abbe_model::Diagnostic;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_json::value::RawValue;
 
-use super::format::{Content, DataFormat, Rows, Table, has_extension};
+use super::format::{Content, DataFormat, Rows, has_extension};
 use super::lines::Lines;
 use super::request::{ForeignColumn, Request};
 use super::row::Row;
+use crate::stamp::FileStamp;
 use crate::store::Store;
 
 /// The format, recognised by the extension of the file.
@@ -23,19 +24,11 @@ impl DataFormat for JsonLines {
         has_extension(file, &["jsonl", "ndjson"])
     }
 
-    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, Diagnostic> {
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<(FileStamp, Content), Diagnostic> {
         let lines = Lines::open(request.store, file, &request.format)?;
-        Ok(Content::Table(Table {
-            stamp: lines.stamp().clone(),
-            has_header: true,
-            rows: Box::new(ObjectRows {
-                lines,
-                decimal: char::from(request.format.decimal),
-                socket: socket_key(request),
-                keys: Vec::new(),
-                first: None,
-            }),
-        }))
+        let (stamp, decimal) = (lines.stamp().clone(), char::from(request.format.decimal));
+        let rows = ObjectRows { lines, decimal, socket: socket_key(request), keys: Vec::new(), first: None };
+        Ok((stamp, Content::Table { rows: Box::new(rows), has_header: true }))
     }
 }
 

@@ -10,7 +10,7 @@ use abbe_model::session::limits;
 use super::columns::quantities;
 use super::columns::{Column, Role, known, listed};
 use super::fill::{Cells, Filled, Filling, NOT_ENOUGH};
-use super::missing::{self, Marks};
+use super::missing;
 use super::request::Request;
 use super::{duplicates, required};
 use crate::check;
@@ -105,8 +105,8 @@ pub(crate) fn read(given: &[MemoryColumn<'_>], request: &Request<'_>) -> Result<
     // A reading that lacks a channel stays, if the instrument has others.
     let can_lack = request.instrument().entry().rows_can_lack_channels && quantities(&columns).len() > 1;
     let stays = |column: &Column| can_lack && matches!(column.role, Role::Reading(..));
-    let marks: Vec<Marks<'_>> = (given.iter().zip(&columns))
-        .map(|(of, column)| Marks { name: of.name, missing: if stays(column) { &[] } else { of.missing } })
+    let marks: Vec<MemoryColumn<'_>> = (given.iter().zip(&columns))
+        .map(|(of, column)| MemoryColumn { missing: if stays(column) { &[] } else { of.missing }, ..*of })
         .collect();
     let present = missing::present(&marks, rows).map_err(fault)?;
     let found = present.as_ref().map_or(rows, Vec::len);

@@ -2,19 +2,13 @@
 
 use abbe_model::instrument::Fault;
 
+use super::memory::MemoryColumn;
+
 /// Largest number of intervals of items that a message lists for a column.
 const MAX_LISTED: usize = 8;
 
-/// The marks of a column.
-pub(super) struct Marks<'a> {
-    /// Its name.
-    pub name: &'a str,
-    /// Which values are missing; empty if none is.
-    pub missing: &'a [bool],
-}
-
 /// The rows of which no value is missing; `None` if no value is missing at all.
-pub(super) fn present(given: &[Marks<'_>], rows: usize) -> Result<Option<Vec<usize>>, Fault> {
+pub(super) fn present(given: &[MemoryColumn<'_>], rows: usize) -> Result<Option<Vec<usize>>, Fault> {
     for column in given.iter().filter(|column| !column.missing.is_empty()) {
         let marks = column.missing.len();
         if marks != rows {
@@ -28,7 +22,7 @@ pub(super) fn present(given: &[Marks<'_>], rows: usize) -> Result<Option<Vec<usi
 }
 
 /// How many readings are missing, and where.
-pub(super) fn warning(given: &[Marks<'_>], rows: usize, present: usize) -> String {
+pub(super) fn warning(given: &[MemoryColumn<'_>], rows: usize, present: usize) -> String {
     let named = given.iter().filter(|column| column.missing.contains(&true));
     let places: Vec<String> = named.map(|column| format!("`{}` {}", column.name, items(column.missing))).collect();
     let missing = rows - present;

@@ -8,12 +8,13 @@ use std::path::Path;
 use abbe_model::Diagnostic;
 use abbe_model::words::counted;
 
-use super::format::{Content, DataFormat, Rows, Table, has_extension, starts_with};
+use super::format::{Content, DataFormat, Rows, has_extension, starts_with};
 use super::lines::{Line, Lines};
 use super::number::number;
 use super::request::{Format, Request};
 use super::row::Row;
 use super::tpoint;
+use crate::stamp::FileStamp;
 use crate::store::Store;
 
 /// The format, recognised by its extension and the keyword of its first line.
@@ -28,19 +29,13 @@ impl DataFormat for Mmt {
         has_extension(file, &["dat"]) && starts_with(file, store, |start| start.trim_start().starts_with(START))
     }
 
-    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, Diagnostic> {
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<(FileStamp, Content), Diagnostic> {
         let header = tpoint::columns(file, request)?[..4].to_vec();
         let lines = Lines::open(request.store, file, &request.format)?;
-        Ok(Content::Table(Table {
-            stamp: lines.stamp().clone(),
-            has_header: true,
-            rows: Box::new(RecordRows {
-                lines,
-                format: Format { decimal: b'.', ..request.format.clone() },
-                header: Some(header),
-                record: None,
-            }),
-        }))
+        let stamp = lines.stamp().clone();
+        let format = Format { decimal: b'.', ..request.format.clone() };
+        let rows = Box::new(RecordRows { lines, format, header: Some(header), record: None });
+        Ok((stamp, Content::Table { rows, has_header: true }))
     }
 }
 

@@ -31,39 +31,21 @@ mod tpoint;
 use std::path::Path;
 
 use abbe_model::Diagnostic;
-use abbe_model::instrument::column::Quantity;
-use fill::{BySocket, Filling};
+use fill::Filling;
 use format::Content;
 use request::Request;
 
 use crate::stamp::FileStamp;
 
-/// The content of a data file.
-pub(crate) struct Data {
-    /// The state of the file when it was read.
-    pub stamp: FileStamp,
-    /// Its readings: one set per socket in the file, else one.
-    pub by_socket: BySocket,
-    /// The columns of readings that it has.
-    pub quantities: Vec<Quantity>,
-    /// Warnings about the file.
-    pub warnings: Vec<String>,
-}
-
-/// Reads a data file.
+/// Reads a data file: its state when it was read, and its readings.
 ///
 /// # Errors
 /// Every fault that prevents the use of the file, with its line and what to do.
-pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<Data, Diagnostic> {
-    match formats::of(file, request.store).open(file, request)? {
-        Content::Table(mut table) => {
-            let Filling { by_socket, quantities, warnings } =
-                fill::read(file, table.rows.as_mut(), table.has_header, request)?;
-            Ok(Data { stamp: table.stamp, by_socket, quantities, warnings: request.named(warnings) })
-        }
-        Content::Readings(whole) => {
-            let by_socket = vec![(None, whole.readings)];
-            Ok(Data { stamp: whole.stamp, by_socket, quantities: Vec::new(), warnings: whole.warnings })
-        }
-    }
+pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<(FileStamp, Filling), Diagnostic> {
+    let (stamp, content) = formats::of(file, request.store).open(file, request)?;
+    let filling = match content {
+        Content::Table { mut rows, has_header } => fill::read(file, rows.as_mut(), has_header, request)?,
+        Content::Readings(filling) => filling,
+    };
+    Ok((stamp, filling))
 }

@@ -12,7 +12,7 @@ use calamine::{Data, Error, Ods, Reader, Sheets, Xls, Xlsb, Xlsx, XlsxError, ope
 use zip::ZipArchive;
 
 use super::comment::is_comment;
-use super::format::{Content, DataFormat, Rows, Table, has_extension};
+use super::format::{Content, DataFormat, Rows, has_extension};
 use super::request::{Format, Request};
 use super::row::Row;
 use crate::stamp::FileStamp;
@@ -26,13 +26,10 @@ impl DataFormat for Spreadsheet {
         has_extension(file, &["xlsx", "xlsm", "xlsb", "xls", "ods"])
     }
 
-    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, Diagnostic> {
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<(FileStamp, Content), Diagnostic> {
         let (stamp, rows) = rows(request.store, file, &request.format)?;
-        Ok(Content::Table(Table {
-            stamp,
-            has_header: request.format.header,
-            rows: Box::new(SheetRows(rows.into_iter())),
-        }))
+        let rows = Box::new(SheetRows(rows.into_iter()));
+        Ok((stamp, Content::Table { rows, has_header: request.format.header }))
     }
 }
 

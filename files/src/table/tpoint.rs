@@ -10,10 +10,11 @@ use abbe_model::axis::AxisKind;
 use abbe_model::diagnostic::{Diagnostic, Location};
 use abbe_model::words::counted;
 
-use super::format::{Content, DataFormat, Rows, Table, has_extension, starts_with};
+use super::format::{Content, DataFormat, Rows, has_extension, starts_with};
 use super::lines::Lines;
 use super::request::Request;
 use super::row::Row;
+use crate::stamp::FileStamp;
 use crate::store::Store;
 
 /// The format, recognised by its extension and an option in its second line.
@@ -24,14 +25,12 @@ impl DataFormat for TPoint {
         has_extension(file, &["dat"]) && starts_with(file, store, |start| second_line(start).starts_with(':'))
     }
 
-    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, Diagnostic> {
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<(FileStamp, Content), Diagnostic> {
         let header = columns(file, request)?;
         let lines = Lines::open(request.store, file, &request.format)?;
-        Ok(Content::Table(Table {
-            stamp: lines.stamp().clone(),
-            has_header: true,
-            rows: Box::new(StarRows { lines, header, first: None, is_in_stars: false }),
-        }))
+        let stamp = lines.stamp().clone();
+        let rows = Box::new(StarRows { lines, header, first: None, is_in_stars: false });
+        Ok((stamp, Content::Table { rows, has_header: true }))
     }
 }
 

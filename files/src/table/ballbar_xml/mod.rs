@@ -20,9 +20,11 @@ use abbe_model::session::trajectory;
 use contents::READINGS;
 
 use super::columns::Role;
-use super::format::{Content, DataFormat, WholeReadings, has_extension};
+use super::fill::Filling;
+use super::format::{Content, DataFormat, has_extension};
 use super::number::number;
 use super::request::{ForeignColumn, Request};
+use crate::stamp::FileStamp;
 use crate::store::Store;
 
 /// The format, recognised by the extension of the file.
@@ -33,8 +35,9 @@ impl DataFormat for BallBarXml {
         has_extension(file, &["xml", "b5r"])
     }
 
-    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, Diagnostic> {
-        Ok(Content::Readings(Box::new(read(file, request)?)))
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<(FileStamp, Content), Diagnostic> {
+        let (stamp, filling) = read(file, request)?;
+        Ok((stamp, Content::Readings(filling)))
     }
 }
 
@@ -42,7 +45,7 @@ impl DataFormat for BallBarXml {
 ///
 /// # Errors
 /// If it is not XML, contains no readings, or lacks information for their use, with the line and what to do.
-fn read(file: &Path, request: &Request<'_>) -> Result<WholeReadings, Diagnostic> {
+fn read(file: &Path, request: &Request<'_>) -> Result<(FileStamp, Filling), Diagnostic> {
     let test = request.test;
     let role = value_role(file, request)?;
     let (stamp, contents) = contents::parse(request.store, file, request.format.encoding)?;
@@ -119,7 +122,7 @@ fn read(file: &Path, request: &Request<'_>) -> Result<WholeReadings, Diagnostic>
         ));
     }
     readings.origin = Some(Origin { file: file.to_path_buf(), line });
-    Ok(WholeReadings { stamp, readings, warnings })
+    Ok((stamp, Filling { by_socket: vec![(None, readings)], quantities: Vec::new(), warnings }))
 }
 
 /// The column of ours that READINGS contains, as `[columns]` states.
