@@ -17,7 +17,7 @@ use std::path::Path;
 
 use abbe_files::ReadOptions;
 use abbe_files::import::session::{Draft, SESSION_FILE};
-use abbe_files::import::{ColumnFound, Foreign, Hint, Reading, Source, Understood, instrument};
+use abbe_files::import::{ColumnFound, Foreign, Hint, Reading, Understood, instrument};
 use abbe_files::read::machine_with_bodies;
 use abbe_files::store::Store;
 use abbe_identify::error::{self, CONTRADICTED};
@@ -113,30 +113,13 @@ pub struct ImportedTest {
     /// Number of rows in the file.
     pub rows: usize,
     /// The columns.
-    pub columns: Vec<ImportedColumn>,
+    pub columns: Vec<ColumnFound>,
     /// The first rows as they stand in the file.
     pub first_rows: Vec<Vec<String>>,
     /// Why the session reads a normalised copy; empty if it reads the file as it is.
     pub normalised: Vec<String>,
     /// What was assumed or left out.
     pub remarks: Vec<String>,
-}
-
-/// A column of a foreign file.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct ImportedColumn {
-    /// Its number, from 1.
-    pub number: usize,
-    /// Its name in the file; empty if it has none.
-    pub name: String,
-    /// What it holds, with the unit, such as `c_deg`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub own: Option<String>,
-    /// Whether the file states the unit.
-    pub unit_is_stated: bool,
-    /// `forward` or `backward`, if columns hold one direction each.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub direction: Option<String>,
 }
 
 /// Foreign files as tests of a session: one test each, with the name of the file.
@@ -333,13 +316,6 @@ fn checked(
 const MAX_NAMED: usize = 2;
 
 fn told(file: &Foreign, test: &str, (found, reading, data): (Understood, Reading, String)) -> ImportedTest {
-    let column = |column: ColumnFound| ImportedColumn {
-        number: column.number,
-        name: column.name,
-        own: column.own,
-        unit_is_stated: column.unit_is_stated,
-        direction: column.direction.map(str::to_string),
-    };
     ImportedTest {
         test: test.to_string(),
         file: file.name.clone(),
@@ -349,12 +325,9 @@ fn told(file: &Foreign, test: &str, (found, reading, data): (Understood, Reading
         decimal: found.decimal.to_string(),
         skipped_lines: found.skipped_lines,
         rows: found.row_count,
-        columns: reading.columns.into_iter().map(column).collect(),
+        columns: reading.columns,
         first_rows: found.first_rows,
-        normalised: match reading.source {
-            Source::AsItIs { .. } => Vec::new(),
-            Source::Normalised { because, .. } => because,
-        },
+        normalised: reading.normalised,
         remarks: reading.remarks,
     }
 }

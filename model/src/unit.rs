@@ -27,7 +27,7 @@ impl fmt::Display for Dimension {
 
 macro_rules! units {
     ($($(#[$attribute:meta])? $unit:ident $name:literal $key:literal $symbol:literal $dimension:ident
-       $above:literal $(* $pi:ident)? / $below:literal;)+) => {
+       $above:literal $(* $pi:ident)? / $below:literal $words:literal;)+) => {
         /// A unit of files, results and texts. As text it is its name. The default is that of readings.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
         pub enum Unit { $(#[doc = $symbol] #[serde(rename = $name)] $(#[$attribute])? $unit,)+ }
@@ -43,6 +43,8 @@ macro_rules! units {
             pub const fn symbol(self) -> &'static str { match self { $(Unit::$unit => $symbol,)+ } }
             /// What it measures.
             pub const fn dimension(self) -> Dimension { match self { $(Unit::$unit => Dimension::$dimension,)+ } }
+            /// Its words in the files of other programs, in lower case.
+            const fn words(self) -> &'static str { match self { $(Unit::$unit => $words,)+ } }
             /// The internal value of a number is the number times the quotient of the two.
             const fn size(self) -> [f64; 2] {
                 match self { $(Unit::$unit => [$above $(* std::f64::consts::$pi)?, $below],)+ }
@@ -51,50 +53,51 @@ macro_rules! units {
     };
 }
 
-// The unit, its name in results, its suffix in keys and columns, its symbol, its dimension, its size.
+// The unit, its name in results, its suffix in keys and columns, its symbol, its dimension, its size, its words in the
+// files of other programs.
 units! {
-    Nanometre "nm" "nm" "nm" Length 1.0 / 1e6;
+    Nanometre "nm" "nm" "nm" Length 1.0 / 1e6 "nm";
     #[default]
-    Micrometre "um" "um" "µm" Length 1.0 / 1e3;
-    Millimetre "mm" "mm" "mm" Length 1.0 / 1.0;
-    Centimetre "cm" "cm" "cm" Length 10.0 / 1.0;
-    Metre "m" "m" "m" Length 1e3 / 1.0;
-    Inch "in" "in" "in" Length 25.4 / 1.0;
-    Mil "mil" "mil" "mil" Length 25.4 / 1e3;
-    Microradian "urad" "urad" "µrad" Angle 1.0 / 1e6;
-    Milliradian "mrad" "mrad" "mrad" Angle 1.0 / 1e3;
-    Radian "rad" "rad" "rad" Angle 1.0 / 1.0;
-    Arcsecond "arcsec" "arcsec" "″" Angle 1.0 * PI / 648e3;
-    Arcminute "arcmin" "arcmin" "′" Angle 1.0 * PI / 10800.0;
-    Degree "deg" "deg" "°" Angle 1.0 * PI / 180.0;
-    Grad "grad" "grad" "grad" Angle 1.0 * PI / 180.0;
-    Gon "gon" "gon" "gon" Angle 1.0 * PI / 200.0;
-    MicrometrePerMetre "um/m" "um_m" "µm/m" Number 1.0 / 1e6;
-    Percent "%" "pct" "%" Number 1.0 / 100.0;
-    One "1" "1" "1" Number 1.0 / 1.0;
-    Microsecond "us" "us" "µs" Time 1.0 / 1e6;
-    Millisecond "ms" "ms" "ms" Time 1.0 / 1e3;
-    Second "s" "s" "s" Time 1.0 / 1.0;
-    Minute "min" "min" "min" Time 60.0 / 1.0;
-    Hour "h" "h" "h" Time 3600.0 / 1.0;
-    Celsius "degC" "c" "°C" Temperature 1.0 / 1.0;
-    Kelvin "K" "k" "K" Temperature 1.0 / 1.0;
-    Fahrenheit "degF" "f" "°F" Temperature 5.0 / 9.0;
-    Hectopascal "hPa" "hpa" "hPa" Pressure 100.0 / 1.0;
-    Kilopascal "kPa" "kpa" "kPa" Pressure 1e3 / 1.0;
-    Megapascal "MPa" "mpa" "MPa" Pressure 1e6 / 1.0;
-    Bar "bar" "bar" "bar" Pressure 1e5 / 1.0;
-    Hertz "Hz" "hz" "Hz" Frequency 1.0 / 1.0;
-    PerMinute "rpm" "rpm" "rpm" Frequency 1.0 / 60.0;
-    Watt "W" "w" "W" Power 1.0 / 1.0;
-    Kilowatt "kW" "kw" "kW" Power 1e3 / 1.0;
-    Kilogram "kg" "kg" "kg" Other 1.0 / 1.0;
-    Newton "N" "n" "N" Other 1.0 / 1.0;
-    NewtonMetre "N m" "nm" "N·m" Other 1.0 / 1.0;
-    Ampere "A" "a" "A" Other 1.0 / 1.0;
-    Volt "V" "v" "V" Other 1.0 / 1.0;
-    SquareOfSpeed "(mm/s)^2" "mm2_s2" "(mm/s)²" Other 1.0 / 1.0;
-    SquareOfRate "(rad/s)^2" "rad2_s2" "(rad/s)²" Other 1.0 / 1.0;
+    Micrometre "um" "um" "µm" Length 1.0 / 1e3 "um µm μm micron microns mikrometer micrometer micrometre mum";
+    Millimetre "mm" "mm" "mm" Length 1.0 / 1.0 "mm millimeter millimetre millimeters millimetres";
+    Centimetre "cm" "cm" "cm" Length 10.0 / 1.0 "cm";
+    Metre "m" "m" "m" Length 1e3 / 1.0 "m meter metre meters metres";
+    Inch "in" "in" "in" Length 25.4 / 1.0 "in inch inches zoll in.";
+    Mil "mil" "mil" "mil" Length 25.4 / 1e3 "mil thou mils";
+    Microradian "urad" "urad" "µrad" Angle 1.0 / 1e6 "urad µrad μrad";
+    Milliradian "mrad" "mrad" "mrad" Angle 1.0 / 1e3 "mrad";
+    Radian "rad" "rad" "rad" Angle 1.0 / 1.0 "rad radian radians radiant";
+    Arcsecond "arcsec" "arcsec" "″" Angle 1.0 * PI / 648e3 "arcsec arcseconds ″ as bogensekunden ''";
+    Arcminute "arcmin" "arcmin" "′" Angle 1.0 * PI / 10800.0 "arcmin ′";
+    Degree "deg" "deg" "°" Angle 1.0 * PI / 180.0 "deg ° degree degrees º deg. degs";
+    Grad "grad" "grad" "grad" Angle 1.0 * PI / 180.0 "grad";
+    Gon "gon" "gon" "gon" Angle 1.0 * PI / 200.0 "gon gons grads gradian gradians neugrad";
+    MicrometrePerMetre "um/m" "um_m" "µm/m" Number 1.0 / 1e6 "";
+    Percent "%" "pct" "%" Number 1.0 / 100.0 "";
+    One "1" "1" "1" Number 1.0 / 1.0 "- 1 # none --";
+    Microsecond "us" "us" "µs" Time 1.0 / 1e6 "";
+    Millisecond "ms" "ms" "ms" Time 1.0 / 1e3 "ms msec millis";
+    Second "s" "s" "s" Time 1.0 / 1.0 "s sec second seconds sek sekunden";
+    Minute "min" "min" "min" Time 60.0 / 1.0 "min minutes minuten";
+    Hour "h" "h" "h" Time 3600.0 / 1.0 "h hours std";
+    Celsius "degC" "c" "°C" Temperature 1.0 / 1.0 "°c ºc degc celsius c";
+    Kelvin "K" "k" "K" Temperature 1.0 / 1.0 "k kelvin";
+    Fahrenheit "degF" "f" "°F" Temperature 5.0 / 9.0 "°f degf fahrenheit f";
+    Hectopascal "hPa" "hpa" "hPa" Pressure 100.0 / 1.0 "";
+    Kilopascal "kPa" "kpa" "kPa" Pressure 1e3 / 1.0 "";
+    Megapascal "MPa" "mpa" "MPa" Pressure 1e6 / 1.0 "";
+    Bar "bar" "bar" "bar" Pressure 1e5 / 1.0 "";
+    Hertz "Hz" "hz" "Hz" Frequency 1.0 / 1.0 "";
+    PerMinute "rpm" "rpm" "rpm" Frequency 1.0 / 60.0 "";
+    Watt "W" "w" "W" Power 1.0 / 1.0 "";
+    Kilowatt "kW" "kw" "kW" Power 1e3 / 1.0 "";
+    Kilogram "kg" "kg" "kg" Other 1.0 / 1.0 "";
+    Newton "N" "n" "N" Other 1.0 / 1.0 "";
+    NewtonMetre "N m" "nm" "N·m" Other 1.0 / 1.0 "";
+    Ampere "A" "a" "A" Other 1.0 / 1.0 "";
+    Volt "V" "v" "V" Other 1.0 / 1.0 "";
+    SquareOfSpeed "(mm/s)^2" "mm2_s2" "(mm/s)²" Other 1.0 / 1.0 "";
+    SquareOfRate "(rad/s)^2" "rad2_s2" "(rad/s)²" Other 1.0 / 1.0 "";
 }
 
 /// Internal unit of a quantity.
@@ -137,6 +140,12 @@ impl Unit {
             "percent" => Some(Unit::Percent),
             name => Unit::ALL.iter().find(|unit| unit.name() == name && **unit != Unit::Grad).copied(),
         }
+    }
+
+    /// The unit of a word of another program, such as `Zoll` or `[°C]` without its brackets. `grad` is [`Unit::Grad`].
+    pub fn of_word(word: &str) -> Option<Unit> {
+        let word = word.trim().to_lowercase();
+        Unit::ALL.iter().find(|unit| unit.words().split_whitespace().any(|own| own == word)).copied()
     }
 
     /// The size in the internal unit of its dimension.
@@ -300,5 +309,16 @@ mod tests {
             assert_eq!(serde_json::from_str::<Unit>(&text).unwrap(), *unit);
         }
         assert_eq!(Unit::parse("furlong"), None);
+    }
+
+    #[test]
+    fn a_word_of_another_program_names_one_unit() {
+        let words: Vec<(&str, Unit)> =
+            Unit::ALL.iter().flat_map(|unit| unit.words().split_whitespace().map(|word| (word, *unit))).collect();
+        for (word, unit) in &words {
+            assert_eq!(words.iter().filter(|(other, _)| other == word).count(), 1, "{word}");
+            assert_eq!(Unit::of_word(&format!(" {} ", word.to_uppercase())), Some(*unit), "{word}");
+        }
+        assert_eq!(Unit::of_word(""), None);
     }
 }

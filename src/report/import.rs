@@ -45,7 +45,7 @@ fn of_test(report: &mut Report, test: &ImportedTest) {
         test.separator,
         counted(test.skipped_lines, "line")
     ));
-    let read_as = |own: &Option<String>, direction: &Option<String>| match (own, direction) {
+    let read_as = |own: &Option<String>, direction: &Option<&str>| match (own, direction) {
         (Some(own), Some(direction)) => format!("{own}, {direction}"),
         (Some(own), None) => own.clone(),
         (None, _) => "–".to_string(),

@@ -1,9 +1,9 @@
 //! The rows of a foreign table: encoding, separator, decimal sign, lines above the rows, names of the columns.
 
 use abbe_model::instrument::Fault;
+use abbe_model::unit::Unit;
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
-use super::unit;
 use crate::table::comment::is_comment;
 use crate::table::encoding;
 
@@ -233,7 +233,7 @@ pub(super) fn number_with_unit(cell: &str, decimal: char) -> Option<(f64, &str)>
     }
     let end = cell.rfind(|c: char| c.is_ascii_digit())? + 1;
     let (digits, unit) = cell.split_at(end);
-    unit::of(unit).and_then(|_| Some((number(digits, decimal)?, unit.trim())))
+    Unit::of_word(unit).and_then(|_| Some((number(digits, decimal)?, unit.trim())))
 }
 
 /// Whether cells are a row of readings: as many columns, and at least half of those filled contain numbers.
@@ -304,7 +304,7 @@ fn name_columns(grid: &mut Grid, lines: &[&str]) {
     // The line next to the rows holds units if it holds little else.
     let is_units = |cells: &[String]| {
         let filled: Vec<&String> = cells.iter().filter(|cell| !cell.is_empty()).collect();
-        2 * filled.iter().filter(|cell| unit::of(bare_unit(cell)).is_some()).count() >= filled.len()
+        2 * filled.iter().filter(|cell| Unit::of_word(bare_unit(cell)).is_some()).count() >= filled.len()
     };
     if above.len() > 1
         && let Some(place) = (0..2).find(|place| is_units(&above[*place].2))

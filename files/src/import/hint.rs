@@ -10,7 +10,6 @@ use abbe_model::unit::{Dimension, Unit};
 use super::Expected;
 use super::grid::Grid;
 use super::meaning::{Found, Meaning, names_of, reading, time, unit_of_cells};
-use super::unit;
 use super::words;
 use crate::axes;
 use crate::spelling::suggestion;
@@ -130,7 +129,7 @@ fn meaning(own: &str, grid: &Grid, column: usize, expected: &Expected<'_>) -> Re
         return Ok((reading(column), None));
     }
     let found = plain.rsplit_once('_').and_then(|(stem, word)| {
-        let unit = unit::of(word)?;
+        let unit = Unit::of_word(word)?;
         let axis = axes::axis_index(expected.machine, stem);
         let of_axis = axis.map(|axis| match expected.machine.axes[axis].kind {
             AxisKind::Linear => (Meaning::Axis(axis), Dimension::Length),

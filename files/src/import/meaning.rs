@@ -6,6 +6,8 @@ use abbe_model::driver::column as driver;
 use abbe_model::instrument::column::{Column, Quantity};
 use abbe_model::instrument::{Fault, InstrumentKind};
 use abbe_model::unit::{Dimension, Unit};
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::Expected;
 use super::grid::{Grid, number_with_unit};
@@ -14,18 +16,21 @@ use super::words::{self, AxisWord, Direction};
 use crate::spelling::most_similar;
 use crate::table::columns::listed;
 
-/// A column as it is understood.
-#[derive(Clone, Debug, PartialEq)]
+/// A column of a foreign file.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[schemars(rename = "ImportedColumn")]
 pub struct ColumnFound {
     /// Its number, from 1.
     pub number: usize,
     /// Its name in the file; empty if it has none.
     pub name: String,
-    /// What it holds, with the unit: our column, or `polar_deg`. `None` for a column that is not used.
+    /// What it holds, with the unit, such as `c_deg`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub own: Option<String>,
     /// Whether the file states the unit.
     pub unit_is_stated: bool,
-    /// Forward or backward, if columns hold one direction each.
+    /// `forward` or `backward`, if columns hold one direction each.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub direction: Option<&'static str>,
 }
 
@@ -127,7 +132,7 @@ fn axis_word(name: &str, expected: &Expected<'_>) -> Option<AxisWord> {
 
 /// What the name of a column says.
 fn by_name(grid: &Grid, column: usize, expected: &Expected<'_>, joints_from: usize) -> Option<Found> {
-    let of_line = grid.units.get(column).and_then(|unit| unit::of(unit));
+    let of_line = grid.units.get(column).and_then(|unit| Unit::of_word(unit));
     let of_cells = unit_of_cells(grid, column);
     let of = |text: &str, unit: Option<Unit>| {
         let of_name = of_line.or(unit);
@@ -136,8 +141,7 @@ fn by_name(grid: &Grid, column: usize, expected: &Expected<'_>, joints_from: usi
         let (direction, plain) = words::direction(text, &all);
         [(&plain, direction), (&all, None)].into_iter().find_map(|(words, direction)| {
             let meaning = meaning(words, unit, grid, column, expected, joints_from)?;
-            let is_from_zenith =
-                meaning == Meaning::Reading(ELEVATION, true) && words::is_one_of(words, &words::ZENITH);
+            let is_from_zenith = meaning == Meaning::Reading(ELEVATION, true) && words::is_one_of(words, words::ZENITH);
             let has_unit_in_cells = of_name.is_none() && of_cells.is_some();
             Some(Found { column, meaning, unit, has_unit_in_cells, is_from_zenith, is_hinted: false, direction })
         })
@@ -162,7 +166,7 @@ pub(super) fn unit_of_cells(grid: &Grid, column: usize) -> Option<Unit> {
     let ends_with_letter = |cell: &&String| cell.chars().next_back().is_some_and(|last| !last.is_ascii_digit());
     cells.filter(ends_with_letter).find_map(|cell| {
         let (_, found) = number_with_unit(cell, grid.decimal)?;
-        (!found.is_empty()).then(|| unit::of(found)).flatten()
+        (!found.is_empty()).then(|| Unit::of_word(found)).flatten()
     })
 }
 
@@ -218,13 +222,13 @@ fn meaning(
         }
     }
     let is_of = |dimension: Dimension| unit.is_some_and(|unit| unit.dimension() == dimension);
-    if words::is_one_of(words, &words::TIME) && unit.is_none() || is_of(Dimension::Time) {
+    if words::is_one_of(words, words::TIME) && unit.is_none() || is_of(Dimension::Time) {
         return time(grid, column);
     }
-    if words::is_one_of(words, &words::TEMPERATURE) && unit.is_none() || is_of(Dimension::Temperature) {
+    if words::is_one_of(words, words::TEMPERATURE) && unit.is_none() || is_of(Dimension::Temperature) {
         return Some(Meaning::Temperature);
     }
-    if words::is_one_of(words, &words::RUN) && (unit.is_none() || is_of(Dimension::Number)) {
+    if words::is_one_of(words, words::RUN) && (unit.is_none() || is_of(Dimension::Number)) {
         return Some(Meaning::Run);
     }
     for column in expected.station.columns() {
@@ -237,10 +241,10 @@ fn meaning(
             return Some(reading(column));
         }
     }
-    if expected.kind() == InstrumentKind::Tracker && is_angle && words::is_one_of(words, &words::ZENITH) {
+    if expected.kind() == InstrumentKind::Tracker && is_angle && words::is_one_of(words, words::ZENITH) {
         return Some(Meaning::Reading(ELEVATION, true));
     }
-    let polar = expected.circle.is_some() && is_angle && words::is_one_of(words, &words::POLAR);
+    let polar = expected.circle.is_some() && is_angle && words::is_one_of(words, words::POLAR);
     polar.then_some(Meaning::Polar)
 }
 

@@ -79,8 +79,6 @@ pub struct Understood {
     pub decimal: char,
     /// Lines above the names, or above the first row if there are none.
     pub skipped_lines: usize,
-    /// The columns.
-    pub columns: Vec<ColumnFound>,
     /// Number of rows that are read.
     pub row_count: usize,
     /// The first rows, as they stand in the file.
@@ -98,29 +96,16 @@ pub struct Reading {
     pub scale_mm: f64,
     /// The columns with the units assumed.
     pub columns: Vec<ColumnFound>,
-    /// How a session reads it.
-    pub source: Source,
+    /// `[format]` of the session that reads it.
+    pub format: Format,
+    /// `[columns]` of that session.
+    pub own_columns: Columns,
+    /// A table with our columns, which that session reads in place of the file.
+    pub copy: Option<String>,
+    /// What `[format]` and `[columns]` cannot state, so that there is a copy.
+    pub normalised: Vec<String>,
     /// What was done or left out.
     pub remarks: Vec<String>,
-}
-
-/// How a session reads a table.
-#[derive(Clone, Debug)]
-pub enum Source {
-    /// The file as it is.
-    AsItIs {
-        /// `[format]`.
-        format: Format,
-        /// `[columns]`.
-        columns: Columns,
-    },
-    /// A table with our columns in place of the file.
-    Normalised {
-        /// Its text.
-        csv: String,
-        /// What a session could not state.
-        because: Vec<String>,
-    },
 }
 
 /// Number of rows that are shown.
@@ -140,13 +125,11 @@ pub fn understand(name: &str, bytes: &[u8], expected: &Expected<'_>) -> Result<U
     let found = hint::found(&grid, expected).and_then(|found| meaning::of(&grid, expected, found));
     let found = found.map_err(|fault| grid.with_layout(fault))?;
     let readings = normalise::readings(name, &grid, &found, expected).map_err(|fault| grid.with_layout(fault))?;
-    let first = readings.first().ok_or_else(|| ("the file has no rows".to_string(), String::new()))?;
     Ok(Understood {
         encoding: grid.encoding,
         separator: grid.separator_in_words(),
         decimal: grid.decimal,
         skipped_lines: grid.skipped_lines(),
-        columns: first.columns.clone(),
         row_count: grid.rows.len(),
         first_rows: grid.rows.iter().take(SHOWN).map(|row| row.cells.clone()).collect(),
         readings,

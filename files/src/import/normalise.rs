@@ -15,7 +15,7 @@ use super::meaning::{ColumnFound, Found, Meaning};
 use super::open_units::{self, Choice, open};
 use super::values::Values;
 use super::words::Direction;
-use super::{Expected, Reading, Source};
+use super::{Expected, Reading};
 use crate::axes;
 
 /// The ways to read a table, the most probable first. `name` is that of the file, for the head of a copy.
@@ -90,12 +90,9 @@ fn reading(
     if !unused.is_empty() {
         remarks.push(format!("not read: {}", unused.join(", ")));
     }
-    let source = if because.is_empty() {
-        as_it_is(grid, &columns)
-    } else {
-        Source::Normalised { csv: normalised(name, grid, found, expected, values, &unit, &because), because }
-    };
-    Reading { assumes, scale_mm, columns, source, remarks }
+    let copy = (!because.is_empty()).then(|| normalised(name, grid, found, expected, values, &unit, &because));
+    let (format, own_columns) = if copy.is_none() { layout(grid, &columns) } else { Default::default() };
+    Reading { assumes, scale_mm, columns, format, own_columns, copy, normalised: because, remarks }
 }
 
 /// Our name of a column, with its unit.
@@ -129,7 +126,7 @@ fn converted(one: &Found, unit: Unit, value: f64) -> f64 {
 }
 
 /// `[format]` and `[columns]` of a table that a reader of tables accepts.
-fn as_it_is(grid: &Grid, columns: &[ColumnFound]) -> Source {
+fn layout(grid: &Grid, columns: &[ColumnFound]) -> (Format, Columns) {
     let text = |text: char| text.to_string();
     let format = Format {
         separator: grid.separator.filter(|separator| *separator != ',').map(text),
@@ -152,14 +149,11 @@ fn as_it_is(grid: &Grid, columns: &[ColumnFound]) -> Source {
             None => own.push((name.clone(), foreign)),
         }
     }
-    Source::AsItIs { format, columns: Columns { driver: Named(drivers), own: Named(own) } }
+    (format, Columns { driver: Named(drivers), own: Named(own) })
 }
 
-/// A column of the table that is written: its name, and the cell of a row of the grid in a direction.
-struct Written<'w> {
-    name: String,
-    cell: Box<dyn Fn(usize, Option<Direction>) -> String + 'w>,
-}
+/// The cell of a column in a row of the grid and a direction.
+type Cell<'w> = Box<dyn Fn(usize, Option<Direction>) -> String + 'w>;
 
 /// The table with our columns.
 fn normalised(
@@ -183,7 +177,7 @@ fn normalised(
         let written = unit(one).in_files();
         if written.is_angle() { written.to_internal(value(one, row)) } else { f64::NAN }
     };
-    let mut written: Vec<Written<'_>> = Vec::new();
+    let mut written: Vec<(String, Cell<'_>)> = Vec::new();
     let mut seen: Vec<&Meaning> = Vec::new();
     for one in found {
         if seen.contains(&&one.meaning)
@@ -200,7 +194,7 @@ fn normalised(
                     let cell = move |row: usize, _: Option<Direction>| {
                         decimal(circle.centre_mm[place] + circle.amplitude_mm[place] * part(in_rad(one, row)))
                     };
-                    written.push(Written { name: axis_name(axis, Unit::Millimetre, expected), cell: Box::new(cell) });
+                    written.push((axis_name(axis, Unit::Millimetre, expected), Box::new(cell)));
                 }
             }
             meaning => {
@@ -214,7 +208,7 @@ fn normalised(
                         _ => decimal(value(one, row)),
                     }
                 };
-                written.push(Written { name: own_name(one, unit(one), expected), cell: Box::new(cell) });
+                written.push((own_name(one, unit(one), expected), Box::new(cell)));
             }
         }
     }
@@ -237,14 +231,12 @@ fn normalised(
     }
     let mut text = format!("# From {}: {}.\n", name.replace(['\n', '\r'], " "), because.join("; "));
     let header: Vec<&str> =
-        directed.then_some("run").into_iter().chain(written.iter().map(|column| column.name.as_str())).collect();
+        directed.then_some("run").into_iter().chain(written.iter().map(|(name, _)| name.as_str())).collect();
     text += &header.join(",");
     text.push('\n');
     for (row, direction, run) in order {
-        let cells = run
-            .map(|run| run.to_string())
-            .into_iter()
-            .chain(written.iter().map(|column| (column.cell)(row, direction)));
+        let cells =
+            run.map(|run| run.to_string()).into_iter().chain(written.iter().map(|(_, cell)| cell(row, direction)));
         text += &cells.collect::<Vec<_>>().join(",");
         text.push('\n');
     }

@@ -7,18 +7,17 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::diagnostic::{Diagnostic, Location};
 use abbe_model::document::edit::SessionText;
-use abbe_model::document::kind::Kind;
 use abbe_model::document::layout::{Columns, Format};
 use abbe_model::document::measurement::Test;
 use abbe_model::document::node::Node;
-use abbe_model::document::session::{Instrument, MachineFile, Session as Document, SessionMachine, Unknowns};
+use abbe_model::document::session::Session as Document;
 use abbe_model::instrument::{Fault, InstrumentKind};
 use abbe_model::session::planned::checked_plan;
 use abbe_model::session::{Session, trajectory};
 
 use super::foreign::Foreign;
 use super::guess::{only_axis, unknown_set_up};
-use super::{Circle, Expected, Hint, Reading, Source, Understood, understand};
+use super::{Circle, Expected, Hint, Reading, Understood, understand};
 use crate::access::{self, ReadOptions};
 use crate::read::{self, MachineRead};
 use crate::source::{Parsed, Source as Text};
@@ -105,31 +104,12 @@ impl Draft {
     ) -> Result<Draft, Diagnostic> {
         check_keys(set)?;
         let MachineRead { source, bodies, .. } = read::machine_with_bodies(file, options)?;
-        let document = Document {
-            machine: SessionMachine::File(MachineFile { file: "machine.toml".into() }),
-            about: Default::default(),
-            constants: Default::default(),
-            instrument: Instrument {
-                kind: Kind(kind),
-                noise_um: None,
-                noise_arcsec: None,
-                resolution_um: None,
-                resolution_arcsec: None,
-            },
-            unknowns: Unknowns::default(),
-            format: None,
-            columns: None,
-            effect: Vec::new(),
-            test: Vec::new(),
-            socket_distance: Vec::new(),
-            tolerance: None,
-            clearance: None,
-        };
+        let text = format!("[machine]\nfile = \"machine.toml\"\n\n[instrument]\nkind = \"{}\"\n", kind.word());
         let session = PathBuf::from(SESSION_FILE);
         let mut new = vec![("machine.toml".to_string(), source.text.into_bytes())];
         new.extend(bodies.into_iter().map(|body| (body.name, body.contents.to_vec())));
         let mut draft = Draft {
-            text: SessionText::of_document(&document, &session)?,
+            text: SessionText::new(&text, &session)?,
             file: session,
             existing: BTreeMap::new(),
             taken: BTreeSet::new(),
@@ -287,8 +267,7 @@ impl Draft {
     /// # Errors
     /// If the text is no session.
     pub fn planned(&self) -> Result<Session, Diagnostic> {
-        let options = ReadOptions { read_data: false, ..self.options() };
-        read::session_of(&Text::new(&self.file, &self.text.to_string()), &options).map(|(session, _)| session)
+        self.read_tests(&ReadOptions { read_data: false, ..self.options() }, None)
     }
 
     /// The session with its readings, without the tests whose files are not there yet.
@@ -296,11 +275,9 @@ impl Draft {
     /// # Errors
     /// If the readings cannot be used.
     pub fn read(&self) -> Result<Session, Diagnostic> {
-        let mut text = self.text.clone();
-        if !self.awaited.is_empty() {
-            text.keep_tests(&|name| !self.awaited.contains(name));
-        }
-        read::session_of(&Text::new(&self.file, &text.to_string()), &self.options()).map(|(session, _)| session)
+        let is_there = |name: &str| !self.awaited.contains(name);
+        let kept: &dyn Fn(&str) -> bool = &is_there;
+        self.read_tests(&self.options(), (!self.awaited.is_empty()).then_some(kept))
     }
 
     /// As [`Draft::read`], with one test. The files of the others need not be known yet.
@@ -308,9 +285,15 @@ impl Draft {
     /// # Errors
     /// If the readings cannot be used.
     pub fn read_alone(&self, test: &str) -> Result<Session, Diagnostic> {
+        self.read_tests(&self.options(), Some(&|name: &str| name == test))
+    }
+
+    fn read_tests(&self, options: &ReadOptions, kept: Option<&dyn Fn(&str) -> bool>) -> Result<Session, Diagnostic> {
         let mut text = self.text.clone();
-        text.keep_tests(&|name| name == test);
-        read::session_of(&Text::new(&self.file, &text.to_string()), &self.options()).map(|(session, _)| session)
+        if let Some(kept) = kept {
+            text.keep_tests(kept);
+        }
+        read::session_of(&Text::new(&self.file, &text.to_string()), options).map(|(session, _)| session)
     }
 
     fn options(&self) -> ReadOptions {
@@ -352,23 +335,20 @@ impl Draft {
     /// # Errors
     /// If the text of the session cannot be edited.
     pub fn apply(&mut self, test: &str, file: &Foreign, reading: &Reading) -> Result<String, Diagnostic> {
-        let name = self.data_name(file, matches!(reading.source, Source::Normalised { .. }));
-        let (contents, format, columns) = match &reading.source {
-            Source::AsItIs { format, columns } => (file.bytes.clone(), format.clone(), columns.clone()),
-            Source::Normalised { csv, .. } => {
-                let own = Columns::default();
-                let format = Format { separator: self.states_layout.then(|| ",".into()), ..Format::default() };
-                (csv.clone().into_bytes(), format, own)
-            }
-        };
-        self.new.push((name.clone(), contents));
+        let name = self.data_name(file, reading.copy.is_some());
+        let mut format = reading.format.clone();
+        if reading.copy.is_some() {
+            format.separator = self.states_layout.then(|| ",".into());
+        }
+        let contents = reading.copy.as_ref().map_or(&file.bytes[..], |copy| copy.as_bytes());
+        self.new.push((name.clone(), contents.to_vec()));
         self.text.set_data(&[(test.to_string(), name.clone())]);
         // An empty table maps no column: the file has the default names.
         if self.states_layout || format != Format::default() {
             self.text.set_of_test(test, "format", &format)?;
         }
-        if self.states_layout || columns != Columns::default() {
-            self.text.set_of_test(test, "columns", &columns)?;
+        if self.states_layout || reading.own_columns != Columns::default() {
+            self.text.set_of_test(test, "columns", &reading.own_columns)?;
         }
         Ok(name)
     }
@@ -395,21 +375,18 @@ impl Draft {
     /// # Errors
     /// If the text of the session cannot be edited.
     pub fn share_layout(&mut self, readings: &[&Reading]) -> Result<(), Diagnostic> {
-        let layouts: Vec<(&Format, &Columns)> = (readings.iter())
-            .filter_map(|reading| match &reading.source {
-                Source::AsItIs { format, columns } => Some((format, columns)),
-                Source::Normalised { .. } => None,
-            })
-            .collect();
-        let Some(&(format, columns)) = layouts.first() else { return Ok(()) };
-        if !self.is_new || layouts.len() < readings.len() || layouts.iter().any(|other| *other != (format, columns)) {
+        let Some(first) = readings.first() else { return Ok(()) };
+        let is_shared = |other: &&Reading| {
+            other.copy.is_none() && (&other.format, &other.own_columns) == (&first.format, &first.own_columns)
+        };
+        if !self.is_new || !readings.iter().all(is_shared) {
             return Ok(());
         }
         self.text.remove_of_tests(&["format", "columns"]);
-        if *format != Format::default() {
-            self.text.set_table("format", format)?;
+        if first.format != Format::default() {
+            self.text.set_table("format", &first.format)?;
         }
-        self.text.set_table("columns", columns)
+        self.text.set_table("columns", &first.own_columns)
     }
 
     /// A name beside the session that no file of the session has, planned ones among them, in any case of letters.

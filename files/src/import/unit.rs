@@ -5,39 +5,6 @@ use abbe_model::unit::Unit;
 /// What `grad` may be.
 pub(super) const DEGREE_OR_GON: [Unit; 2] = [Unit::Degree, Unit::Gon];
 
-/// The units with their words, in lower case.
-const WORDS: [(Unit, &[&str]); 23] = [
-    (Unit::Millimetre, &["mm", "millimeter", "millimetre", "millimeters", "millimetres"]),
-    (Unit::Micrometre, &["um", "µm", "μm", "micron", "microns", "mikrometer", "micrometer", "micrometre", "mum"]),
-    (Unit::Metre, &["m", "meter", "metre", "meters", "metres"]),
-    (Unit::Inch, &["in", "inch", "inches", "zoll", "in."]),
-    (Unit::Mil, &["mil", "thou", "mils"]),
-    (Unit::Centimetre, &["cm"]),
-    (Unit::Nanometre, &["nm"]),
-    (Unit::Degree, &["deg", "°", "degree", "degrees", "º", "deg.", "degs"]),
-    (Unit::Radian, &["rad", "radian", "radians", "radiant"]),
-    (Unit::Milliradian, &["mrad"]),
-    (Unit::Microradian, &["urad", "µrad", "μrad"]),
-    (Unit::Arcsecond, &["arcsec", "arcseconds", "″", "as", "bogensekunden", "''"]),
-    (Unit::Arcminute, &["arcmin", "′"]),
-    (Unit::Gon, &["gon", "gons", "grads", "gradian", "gradians", "neugrad"]),
-    (Unit::Grad, &["grad"]),
-    (Unit::Second, &["s", "sec", "second", "seconds", "sek", "sekunden"]),
-    (Unit::Millisecond, &["ms", "msec", "millis"]),
-    (Unit::Minute, &["min", "minutes", "minuten"]),
-    (Unit::Hour, &["h", "hours", "std"]),
-    (Unit::Celsius, &["°c", "ºc", "degc", "celsius", "c"]),
-    (Unit::Kelvin, &["k", "kelvin"]),
-    (Unit::Fahrenheit, &["°f", "degf", "fahrenheit", "f"]),
-    (Unit::One, &["-", "1", "#", "none", "--"]),
-];
-
-/// The unit of a word.
-pub(super) fn of(word: &str) -> Option<Unit> {
-    let word = word.trim().to_lowercase();
-    WORDS.iter().find(|(_, words)| words.contains(&word.as_str())).map(|(unit, _)| *unit)
-}
-
 /// The name of a column without its unit, and the unit: in brackets, behind a slash, a comma or "in", or as the last word.
 /// A unit of one letter that is no more than a last word may be a part of the name; it is `weak`.
 pub(crate) struct Named<'n> {
@@ -51,7 +18,7 @@ pub(crate) fn split(name: &str) -> Named<'_> {
     for (open, close) in [('[', ']'), ('(', ')'), ('{', '}'), ('<', '>')] {
         if let (Some(start), Some(end)) = (name.find(open), name.rfind(close))
             && start < end
-            && let Some(unit) = of(&name[start + open.len_utf8()..end])
+            && let Some(unit) = Unit::of_word(&name[start + open.len_utf8()..end])
         {
             return Named { base: name[..start].trim(), unit: Some(unit), weak: false };
         }
@@ -59,7 +26,7 @@ pub(crate) fn split(name: &str) -> Named<'_> {
     for between in [" / ", "/", ", ", " in ", ": "] {
         if let Some((base, last)) = name.rsplit_once(between)
             && !base.trim().is_empty()
-            && let Some(unit) = of(last)
+            && let Some(unit) = Unit::of_word(last)
         {
             return Named { base: base.trim(), unit: Some(unit), weak: false };
         }
@@ -67,7 +34,7 @@ pub(crate) fn split(name: &str) -> Named<'_> {
     for between in ['_', ' ', '.', '-'] {
         if let Some((base, last)) = name.rsplit_once(between)
             && !base.trim().is_empty()
-            && let Some(unit) = of(last).filter(|unit| *unit != Unit::One)
+            && let Some(unit) = Unit::of_word(last).filter(|unit| *unit != Unit::One)
         {
             return Named { base: base.trim(), unit: Some(unit), weak: last.chars().count() < 2 };
         }
@@ -98,13 +65,13 @@ mod tests {
     #[test]
     fn other_units_are_converted() {
         let converted = |word: &str, value: f64| {
-            let unit = of(word).unwrap();
+            let unit = Unit::of_word(word).unwrap();
             unit.convert(value, unit.in_files()).unwrap()
         };
         assert!((converted("°F", 68.0) - 20.0).abs() < 1e-12);
         assert!((converted("K", 293.15) - 20.0).abs() < 1e-12);
         assert_eq!(converted("gon", 100.0), 90.0);
-        assert_eq!(of("Grad"), Some(Unit::Grad));
+        assert_eq!(Unit::of_word("Grad"), Some(Unit::Grad));
         assert_eq!(converted("ms", 1500.0), 1.5);
         assert_eq!(converted("cm", 2.0), 20.0);
     }

@@ -10,7 +10,6 @@ use abbe_model::words::{counted, with_article};
 use super::Expected;
 use super::grid::{Grid, number_with_unit};
 use super::meaning::{Found, Meaning};
-use super::unit;
 
 /// Largest share of rows without a number in a column that is read.
 const MAX_DROPPED: f64 = 0.1;
@@ -133,7 +132,7 @@ fn number_of(grid: &Grid, one: &Found, line: usize, cell: &str, needs: &mut Need
             help.into(),
         ))
     };
-    let Some(unit) = unit::of(word).filter(|_| !word.is_empty()) else {
+    let Some(unit) = Unit::of_word(word).filter(|_| !word.is_empty()) else {
         return if one.has_unit_in_cells {
             fault("has no unit, and other numbers of the column have one".into())
         } else {

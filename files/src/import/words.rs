@@ -39,48 +39,17 @@ pub(super) fn words(name: &str) -> Vec<String> {
     words
 }
 
+/// Whether a list of words holds one.
+fn holds(list: &str, word: &str) -> bool {
+    list.split(' ').any(|own| own == word)
+}
+
 /// What programs say of the position of an axis, besides its name.
-const OF_AXIS: [&str; 37] = [
-    "axis",
-    "achse",
-    "axe",
-    "pos",
-    "position",
-    "angle",
-    "winkel",
-    "joint",
-    "gelenk",
-    "theta",
-    "actual",
-    "act",
-    "ist",
-    "istwert",
-    "cmd",
-    "command",
-    "commanded",
-    "soll",
-    "sollwert",
-    "set",
-    "setpoint",
-    "nominal",
-    "nom",
-    "encoder",
-    "value",
-    "wert",
-    "rotary",
-    "machine",
-    "maschine",
-    "programmed",
-    "prog",
-    "target",
-    "ref",
-    "nc",
-    "mcs",
-    "drehwinkel",
-    "lage",
-];
+const OF_AXIS: &str = "axis achse axe pos position angle winkel joint gelenk theta actual act ist istwert cmd command commanded \
+    soll sollwert set setpoint nominal nom encoder value wert rotary machine maschine programmed prog target ref \
+    nc mcs drehwinkel lage";
 /// Words before the number of a joint.
-const NUMBERED: [&str; 9] = ["joint", "gelenk", "axis", "achse", "q", "j", "a", "theta", "axe"];
+const NUMBERED: &str = "joint gelenk axis achse q j a theta axe";
 /// The joints of a six-axis arm in the words of ROS, in their order.
 const ROS: [&[&str]; 6] =
     [&["shoulder", "pan"], &["shoulder", "lift"], &["elbow"], &["wrist", "1"], &["wrist", "2"], &["wrist", "3"]];
@@ -98,7 +67,7 @@ pub(super) enum AxisWord {
 
 /// Words without what programs say of the position of an axis.
 fn bare(words: &[String]) -> Vec<&str> {
-    words.iter().map(String::as_str).filter(|word| !OF_AXIS.contains(word)).collect()
+    words.iter().map(String::as_str).filter(|word| !holds(OF_AXIS, word)).collect()
 }
 
 /// The axis of a name.
@@ -128,8 +97,8 @@ pub(super) fn axis(words: &[String], machine: &Machine) -> Option<AxisWord> {
         let axes = (0..machine.axes.len()).filter(|k| machine.axes[*k].kind == AxisKind::Rotary);
         return axes.clone().nth(joint).map(AxisWord::Axis);
     }
-    let is_joint = words.iter().any(|word| NUMBERED.contains(&word.as_str()));
-    let numbers: Vec<&str> = rest.iter().copied().filter(|word| !NUMBERED.contains(word)).collect();
+    let is_joint = words.iter().any(|word| holds(NUMBERED, word));
+    let numbers: Vec<&str> = rest.iter().copied().filter(|word| !holds(NUMBERED, word)).collect();
     match numbers[..] {
         [number] if is_joint => number.parse().ok().map(AxisWord::Number),
         [] if !words.is_empty() && rest.is_empty() => Some(AxisWord::Unnamed),
@@ -144,47 +113,15 @@ pub(super) enum Direction {
     Backward,
 }
 
-const FORWARD: [&str; 13] = [
-    "forward",
-    "forwards",
-    "fwd",
-    "vor",
-    "vorwarts",
-    "vorwaerts",
-    "hin",
-    "hinweg",
-    "cw",
-    "clockwise",
-    "plus",
-    "positive",
-    "aller",
-];
-const BACKWARD: [&str; 18] = [
-    "backward",
-    "backwards",
-    "bwd",
-    "back",
-    "ruck",
-    "rueck",
-    "zuruck",
-    "zurueck",
-    "ruckwarts",
-    "rueckwarts",
-    "ruckweg",
-    "return",
-    "reverse",
-    "rev",
-    "ccw",
-    "anticlockwise",
-    "minus",
-    "retour",
-];
+const FORWARD: &str = "forward forwards fwd vor vorwarts vorwaerts hin hinweg cw clockwise plus positive aller";
+const BACKWARD: &str = "backward backwards bwd back ruck rueck zuruck zurueck ruckwarts rueckwarts ruckweg return reverse rev ccw \
+    anticlockwise counterclockwise minus retour";
 
 /// The direction of a name, and its words without it.
 pub(super) fn direction(name: &str, words: &[String]) -> (Option<Direction>, Vec<String>) {
     let of = |word: &str| match word {
-        word if FORWARD.contains(&word) => Some(Direction::Forward),
-        word if BACKWARD.contains(&word) || word == "counterclockwise" => Some(Direction::Backward),
+        word if holds(FORWARD, word) => Some(Direction::Forward),
+        word if holds(BACKWARD, word) => Some(Direction::Backward),
         _ => None,
     };
     let rest: Vec<String> = words.iter().filter(|word| of(word).is_none()).cloned().collect();
@@ -197,119 +134,76 @@ pub(super) fn direction(name: &str, words: &[String]) -> (Option<Direction>, Vec
 }
 
 /// The words of a reading of an instrument, by the name of our column without its unit.
-const READINGS: [(&str, &[&str]); 23] = [
-    (
-        "length",
-        &["lange", "laenge", "l", "dbb", "bar", "ballbar", "messwert", "reading", "barlength", "stablange", "radius"],
-    ),
-    (
-        "deviation",
-        &[
-            "abweichung",
-            "dev",
-            "delta",
-            "dl",
-            "deltal",
-            "error",
-            "fehler",
-            "messabweichung",
-            "ecart",
-            "abw",
-            "radialerror",
-        ],
-    ),
-    ("distance", &["abstand", "distanz", "d", "entfernung", "range"]),
-    ("range", &["distance", "dist", "entfernung", "strecke", "slope", "slopedistance", "d", "r"]),
-    ("azimuth", &["az", "hz", "azimut", "horizontal", "horizontalangle", "horizontalwinkel"]),
-    ("elevation", &["el", "elev", "vertical", "verticalangle", "hohenwinkel"]),
-    ("px", &["x"]),
-    ("py", &["y"]),
-    ("pz", &["z"]),
-    ("dx", &["deltax", "ex", "x", "devx", "abwx"]),
-    ("dy", &["deltay", "ey", "y", "devy", "abwy"]),
-    ("dz", &["deltaz", "ez", "z", "devz", "abwz"]),
-    ("du", &["u", "sensor1", "probe1", "taster1"]),
-    ("dv", &["v", "sensor2", "probe2", "taster2"]),
-    ("dw", &["w", "sensor3", "probe3", "taster3"]),
-    ("displacement", &["laser", "weg", "verschiebung", "laserposition"]),
-    ("horizontal", &["horizontalstraightness", "straightnessh", "geradheith", "h"]),
-    ("vertical", &["verticalstraightness", "straightnessv", "geradheitv", "v"]),
-    ("pitch", &["nick", "nicken", "nickwinkel"]),
-    ("yaw", &["gier", "gieren", "gierwinkel"]),
-    ("roll", &["roll", "rollen", "rollwinkel"]),
-    ("angle", &["winkel", "reading", "deviation", "abweichung", "messwert", "autocollimator"]),
-    ("socket", &["nest", "cup", "aufnahme", "pfanne"]),
+const READINGS: [(&str, &str); 23] = [
+    ("length", "lange laenge l dbb bar ballbar messwert reading barlength stablange radius"),
+    ("deviation", "abweichung dev delta dl deltal error fehler messabweichung ecart abw radialerror"),
+    ("distance", "abstand distanz d entfernung range"),
+    ("range", "distance dist entfernung strecke slope slopedistance d r"),
+    ("azimuth", "az hz azimut horizontal horizontalangle horizontalwinkel"),
+    ("elevation", "el elev vertical verticalangle hohenwinkel"),
+    ("px", "x"),
+    ("py", "y"),
+    ("pz", "z"),
+    ("dx", "deltax ex x devx abwx"),
+    ("dy", "deltay ey y devy abwy"),
+    ("dz", "deltaz ez z devz abwz"),
+    ("du", "u sensor1 probe1 taster1"),
+    ("dv", "v sensor2 probe2 taster2"),
+    ("dw", "w sensor3 probe3 taster3"),
+    ("displacement", "laser weg verschiebung laserposition"),
+    ("horizontal", "horizontalstraightness straightnessh geradheith h"),
+    ("vertical", "verticalstraightness straightnessv geradheitv v"),
+    ("pitch", "nick nicken nickwinkel"),
+    ("yaw", "gier gieren gierwinkel"),
+    ("roll", "roll rollen rollwinkel"),
+    ("angle", "winkel reading deviation abweichung messwert autocollimator"),
+    ("socket", "nest cup aufnahme pfanne"),
 ];
 
 /// What programs say of what an instrument measured.
-const MEASURED: [&str; 12] = [
-    "meas",
-    "measured",
-    "measurement",
-    "mess",
-    "messung",
-    "gemessen",
-    "tracker",
-    "laser",
-    "smr",
-    "lt",
-    "reflector",
-    "reflektor",
-];
+const MEASURED: &str = "meas measured measurement mess messung gemessen tracker laser smr lt reflector reflektor";
 /// What programs say of a reading besides.
-const OF_READING: [&str; 14] = [
-    "target",
-    "point",
-    "value",
-    "wert",
-    "pos",
-    "position",
-    "coordinate",
-    "koordinate",
-    "coord",
-    "actual",
-    "act",
-    "ist",
-    "mean",
-    "p",
-];
+const OF_READING: &str = "target point value wert pos position coordinate koordinate coord actual act ist mean p";
+
+/// The words of our column of readings in other programs.
+fn others_of(stem: &str) -> &'static str {
+    READINGS.iter().find(|(own, _)| *own == stem).map_or("", |(_, others)| others)
+}
 
 /// Whether words say that an instrument measured.
 pub(super) fn is_measured(words: &[String]) -> bool {
-    words.iter().any(|word| MEASURED.contains(&word.as_str()))
+    words.iter().any(|word| holds(MEASURED, word))
 }
 
 /// The words of our column of readings, without its unit; ours is the first.
 pub(super) fn of_reading(stem: &'static str) -> impl Iterator<Item = &'static str> {
-    let others = READINGS.iter().find(|(own, _)| *own == stem).map_or(&[][..], |(_, others)| others);
-    std::iter::once(stem).chain(others.iter().copied())
+    std::iter::once(stem).chain(others_of(stem).split(' ').filter(|word| !word.is_empty()))
 }
 
 /// Whether words name our column of readings, without its unit.
 pub(super) fn is_reading(words: &[String], stem: &str) -> bool {
-    let others = READINGS.iter().find(|(own, _)| *own == stem).map_or(&[][..], |(_, others)| others);
-    let is = |joined: &str| joined == stem.replace('_', "") || others.contains(&joined);
-    let without = |left_out: &[&[&str]]| {
+    let others = others_of(stem);
+    let is = |joined: &str| joined == stem.replace('_', "") || holds(others, joined);
+    let without = |left_out: &[&str]| {
         words
             .iter()
             .map(String::as_str)
-            .filter(|word| !left_out.iter().any(|list| list.contains(word)))
+            .filter(|word| !left_out.iter().any(|list| holds(list, word)))
             .collect::<String>()
     };
-    is(&words.concat()) || is(&without(&[&MEASURED])) || is(&without(&[&MEASURED, &OF_READING]))
+    is(&words.concat()) || is(&without(&[MEASURED])) || is(&without(&[MEASURED, OF_READING]))
 }
 
 /// Words of other columns.
-pub(super) fn is_one_of(words: &[String], known: &[&str]) -> bool {
-    known.contains(&words.concat().as_str()) || words.first().is_some_and(|word| known.contains(&word.as_str()))
+pub(super) fn is_one_of(words: &[String], known: &str) -> bool {
+    holds(known, &words.concat()) || words.first().is_some_and(|word| holds(known, word))
 }
 
-pub(super) const TIME: [&str; 6] = ["time", "t", "zeit", "timestamp", "temps", "elapsed"];
-pub(super) const RUN: [&str; 6] = ["run", "lauf", "pass", "cycle", "zyklus", "traversal"];
-pub(super) const TEMPERATURE: [&str; 5] = ["temp", "temperature", "temperatur", "tair", "ambient"];
-pub(super) const POLAR: [&str; 9] =
-    ["polar", "polarangle", "polarwinkel", "phi", "bahnwinkel", "kreiswinkel", "angle", "winkel", "circleangle"];
-pub(super) const ZENITH: [&str; 5] = ["zenith", "zenit", "zenitwinkel", "zd", "vz"];
+pub(super) const TIME: &str = "time t zeit timestamp temps elapsed";
+pub(super) const RUN: &str = "run lauf pass cycle zyklus traversal";
+pub(super) const TEMPERATURE: &str = "temp temperature temperatur tair ambient";
+pub(super) const POLAR: &str = "polar polarangle polarwinkel phi bahnwinkel kreiswinkel angle winkel circleangle";
+pub(super) const ZENITH: &str = "zenith zenit zenitwinkel zd vz";
 
 #[cfg(test)]
 mod tests {
