@@ -108,6 +108,14 @@ pub struct Reading {
     pub remarks: Vec<String>,
 }
 
+/// A table with what its columns hold.
+struct Table<'t> {
+    grid: &'t grid::Grid,
+    found: &'t [meaning::Found],
+    expected: &'t Expected<'t>,
+    values: values::Values,
+}
+
 /// Number of rows that are shown.
 const SHOWN: usize = 5;
 

@@ -15,7 +15,7 @@ use super::meaning::{ColumnFound, Found, Meaning};
 use super::open_units::{self, Choice, open};
 use super::values::Values;
 use super::words::Direction;
-use super::{Expected, Reading};
+use super::{Expected, Reading, Table};
 use crate::axes;
 
 /// The ways to read a table, the most probable first. `name` is that of the file, for the head of a copy.
@@ -28,26 +28,20 @@ pub(super) fn readings(
     found: &[Found],
     expected: &Expected<'_>,
 ) -> Result<Vec<Reading>, Fault> {
-    let values = Values::of(grid, found, expected)?;
+    let table = Table { grid, found, expected, values: Values::of(grid, found, expected)? };
     let mut choices: Vec<Vec<Choice>> = vec![Vec::new()];
-    for options in open(grid, found, expected, &values)? {
+    for options in open(&table)? {
         let before = std::mem::take(&mut choices);
         for option in options {
             choices.extend(before.iter().map(|chosen| chosen.iter().chain([&option]).cloned().collect::<Vec<_>>()));
         }
     }
-    Ok(choices.iter().map(|chosen| reading(name, grid, found, expected, &values, chosen)).collect())
+    Ok(choices.iter().map(|chosen| reading(name, &table, chosen)).collect())
 }
 
 /// The table in one way.
-fn reading(
-    name: &str,
-    grid: &Grid,
-    found: &[Found],
-    expected: &Expected<'_>,
-    values: &Values,
-    chosen: &[Choice],
-) -> Reading {
+fn reading(name: &str, table: &Table<'_>, chosen: &[Choice]) -> Reading {
+    let Table { grid, found, expected, values } = table;
     let assumes: Vec<String> = chosen.iter().map(|choice| choice.text.clone()).collect();
     let scale_mm = chosen.iter().map(|choice| choice.scale_mm).product();
     let chosen: BTreeMap<usize, Unit> = chosen.iter().flat_map(|choice| choice.units.clone()).collect();
@@ -90,7 +84,7 @@ fn reading(
     if !unused.is_empty() {
         remarks.push(format!("not read: {}", unused.join(", ")));
     }
-    let copy = (!because.is_empty()).then(|| normalised(name, grid, found, expected, values, &unit, &because));
+    let copy = (!because.is_empty()).then(|| normalised(name, table, &unit, &because));
     let (format, own_columns) = if copy.is_none() { layout(grid, &columns) } else { Default::default() };
     Reading { assumes, scale_mm, columns, format, own_columns, copy, normalised: because, remarks }
 }
@@ -156,15 +150,8 @@ fn layout(grid: &Grid, columns: &[ColumnFound]) -> (Format, Columns) {
 type Cell<'w> = Box<dyn Fn(usize, Option<Direction>) -> String + 'w>;
 
 /// The table with our columns.
-fn normalised(
-    name: &str,
-    grid: &Grid,
-    found: &[Found],
-    expected: &Expected<'_>,
-    values: &Values,
-    unit: &dyn Fn(&Found) -> Unit,
-    because: &[String],
-) -> String {
+fn normalised(name: &str, table: &Table<'_>, unit: &dyn Fn(&Found) -> Unit, because: &[String]) -> String {
+    let Table { grid, found, expected, values } = table;
     let directed = found.iter().any(|one| one.direction.is_some());
     let value = |one: &Found, row: usize| converted(one, unit(one), values.by_column[&one.column][row]);
     // Of the columns of one meaning, that of a direction.
@@ -179,7 +166,7 @@ fn normalised(
     };
     let mut written: Vec<(String, Cell<'_>)> = Vec::new();
     let mut seen: Vec<&Meaning> = Vec::new();
-    for one in found {
+    for one in found.iter() {
         if seen.contains(&&one.meaning)
             || directed && matches!(one.meaning, Meaning::Time | Meaning::Clock | Meaning::Run)
         {

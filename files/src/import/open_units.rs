@@ -7,11 +7,9 @@ use abbe_model::instrument::Fault;
 use abbe_model::unit::Unit;
 use abbe_model::words::{listed, number};
 
-use super::Expected;
 use super::grid::Grid;
 use super::meaning::{Found, Meaning};
-use super::unit;
-use super::values::Values;
+use super::{Expected, Table, unit};
 
 /// Positions of a rotary axis beyond this, in radians, are degrees: more than one turn either way.
 const MAX_TURN_RAD: f64 = 6.5;
@@ -61,20 +59,15 @@ pub(super) fn has_no_unit(meaning: &Meaning, expected: &Expected<'_>) -> bool {
 ///
 /// # Errors
 /// If the unit of deviations can be told neither from the values nor by a fit: what to state.
-pub(super) fn open(
-    grid: &Grid,
-    found: &[Found],
-    expected: &Expected<'_>,
-    values: &Values,
-) -> Result<Vec<Vec<Choice>>, Fault> {
-    let columns = Open { grid, found, expected, values };
-    let mut open = vec![columns.lengths()?, columns.angles()];
+pub(super) fn open(table: &Table<'_>) -> Result<Vec<Vec<Choice>>, Fault> {
+    let Table { grid, found, expected, values } = table;
+    let mut open = vec![table.lengths()?, table.angles()];
     let is_of = |unit: Unit| move |meaning: &Meaning| unit_of_reading(meaning, expected) == Some(unit);
     // Small rotations are in our unit.
     for (own, columns) in [
-        (Unit::Arcsecond, columns.without(&is_of(Unit::Arcsecond))),
-        (Unit::Second, columns.without(&|meaning| *meaning == Meaning::Time)),
-        (Unit::Celsius, columns.without(&|meaning| *meaning == Meaning::Temperature)),
+        (Unit::Arcsecond, table.without(&is_of(Unit::Arcsecond))),
+        (Unit::Second, table.without(&|meaning| *meaning == Meaning::Time)),
+        (Unit::Celsius, table.without(&|meaning| *meaning == Meaning::Temperature)),
     ] {
         let unit = match own {
             Unit::Second if values.median(columns.first().copied().unwrap_or(0)) > MAX_TIME_S => Unit::Millisecond,
@@ -96,15 +89,7 @@ pub(super) fn open(
     Ok(open)
 }
 
-/// The columns of a file with what is known of them.
-struct Open<'o> {
-    grid: &'o Grid,
-    found: &'o [Found],
-    expected: &'o Expected<'o>,
-    values: &'o Values,
-}
-
-impl Open<'_> {
+impl Table<'_> {
     /// The columns of these meanings that state no unit.
     fn without(&self, of: &dyn Fn(&Meaning) -> bool) -> Vec<usize> {
         let is_open =
