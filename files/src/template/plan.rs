@@ -10,8 +10,8 @@ use abbe_model::axis::AxisKind;
 
 use super::body::{Body, Side};
 use super::geometry::{Geometry, STEM_MM};
-use super::mounts::{Mounts, Setting, point_text};
-use super::rotary::{self, RotaryMotion, RotaryTest};
+use super::mounts::{Mounts, point_text};
+use super::rotary::{self, PlannedMotion, PlannedTest};
 
 /// Names of the directions of R, and of the angles about them.
 const LETTERS: [&str; 3] = ["X", "Y", "Z"];
@@ -41,49 +41,28 @@ const PRIORS: &str = "# Set-up priors: standard uncertainty of the ball position
     spindle_ball_u_um = [1, 1, 1]\n\
     bar_u_um = 0.5\n";
 
-/// A test as text, with what decides its place in the plan.
-struct Planned {
-    extended: bool,
-    spindle: usize,
-    workpiece: usize,
-    text: String,
-}
-
 /// The text of the plan; `None` if it would have no test.
 pub(super) fn text(bodies: &[Body], geometry: &Geometry) -> Option<String> {
     let mut mounts = Mounts::of(bodies, geometry);
-    let (mut planned, mut untested): (Vec<Planned>, Vec<usize>) = (Vec::new(), Vec::new());
+    let (mut planned, mut untested): (Vec<PlannedTest>, Vec<usize>) = (Vec::new(), Vec::new());
     for turning in (0..bodies.len()).filter(|index| bodies[*index].kind == AxisKind::Rotary) {
         let tests = rotary::tests(&mut mounts, bodies, turning, geometry);
         if tests.is_empty() {
             untested.push(turning);
         }
-        planned.extend(tests.iter().map(|test| Planned {
-            extended: test.extended,
-            spindle: test.setting.spindle,
-            workpiece: test.setting.workpiece,
-            text: of_rotary(bodies, turning, &mounts, test),
-        }));
+        planned.extend(tests);
     }
     let pairs = pairs(bodies);
-    for pair in &pairs {
-        let setting = mounts.circle(bodies, *pair);
-        planned.push(Planned {
-            extended: false,
-            spindle: setting.spindle,
-            workpiece: setting.workpiece,
-            text: circle(bodies, *pair, &mounts, &setting),
-        });
-    }
+    planned.extend(pairs.iter().map(|pair| circle(bodies, *pair, &mut mounts)));
     if planned.is_empty() {
         return None;
     }
     // The bar gets its extension once, and a ball is mounted again as seldom as possible.
-    planned.sort_by_key(|test| (test.extended, test.spindle, test.workpiece));
+    planned.sort_by_key(|test| (test.extended, test.setting.spindle, test.setting.workpiece));
     let mut text = HEAD.to_string();
     clearance(&mut text, geometry);
     unknowns(&mut text, bodies, &pairs, &untested);
-    text.extend(planned.into_iter().map(|test| test.text));
+    planned.iter().for_each(|test| self::test(&mut text, bodies, &mounts, test));
     Some(text)
 }
 
@@ -196,54 +175,65 @@ fn pairs(bodies: &[Body]) -> Vec<[usize; 2]> {
     pairs
 }
 
-fn of_rotary(bodies: &[Body], turning: usize, mounts: &Mounts, test: &RotaryTest) -> String {
-    let axis = &bodies[turning];
-    let (name, setting) = (&axis.name, &test.setting);
-    let standing = if axis.side() == Side::Workpiece { "spindle" } else { "workpiece" };
-    let mut text = format!("\n# {}\n", test.about);
-    remounted(&mut text, setting, standing);
-    let _ = write!(text, "[[test]]\nname = \"{}\"\n", test.name);
-    let tilted = test.tilted.map(|(other, deg)| (other, format!("{deg}")));
-    common(&mut text, bodies, test.extended, mounts, setting, &[turning], tilted.as_ref());
-    text.push_str("# The axis moves there and back. Adapt the ends to its travel. `runs` repeats both directions.\n");
-    let _ = match test.motion {
-        RotaryMotion::Sweep { from, to } => {
-            let step = if axis.along == 2 { 2 } else { 1 };
-            writeln!(
-                text,
-                "sweep = {{ axis = \"{name}\", from_deg = {from}, to_deg = {to}, step_deg = {step}, feed_deg_min = 500, runs = 1, both_directions = true }}"
-            )
-        }
-        RotaryMotion::Follow { offset, to } => writeln!(
-            text,
-            "path = {{ kind = \"follow\", axis = \"{name}\", offset = \"{offset}\", from_deg = -{to}, to_deg = {to}, step_deg = 1, feed_deg_min = 300, runs = 1, both_directions = true }}"
-        ),
-    };
-    text
+/// Two linear axes that move the spindle ball on a circle.
+fn circle(bodies: &[Body], pair: [usize; 2], mounts: &mut Mounts) -> PlannedTest {
+    let [a, b] = pair.map(|axis| bodies[axis].name.as_str());
+    PlannedTest {
+        name: format!("{a}{b}"),
+        about: format!("{a} and {b} move the spindle ball on a circle about the workpiece ball."),
+        extended: false,
+        setting: mounts.circle(bodies, pair),
+        standing: Side::Tool,
+        tilted: None,
+        moving: pair.to_vec(),
+        motion: PlannedMotion::Circle,
+    }
 }
 
-fn circle(bodies: &[Body], pair: [usize; 2], mounts: &Mounts, setting: &Setting) -> String {
-    let [a, b] = pair.map(|axis| bodies[axis].name.as_str());
-    let mut text = format!("\n# {a} and {b} move the spindle ball on a circle about the workpiece ball.\n");
-    remounted(&mut text, setting, "spindle");
-    let _ = write!(text, "[[test]]\nname = \"{a}{b}\"\n");
-    common(&mut text, bodies, false, mounts, setting, &pair, None);
-    // Z is the second axis. A table goes down where the spindle ball is above the workpiece ball.
-    let (what, ends) = match (bodies[pair[1]].along, bodies[pair[1]].on_table) {
-        (2, false) => ("an arc of 220° above the table", "from_deg = -20, to_deg = 200, "),
-        (2, true) => ("an arc of 220° with the spindle ball above", "from_deg = -200, to_deg = 20, "),
-        _ => ("a full circle from the first towards the second", ""),
+/// A test with its motion.
+fn test(text: &mut String, bodies: &[Body], mounts: &Mounts, test: &PlannedTest) {
+    let _ = writeln!(text, "\n# {}", test.about);
+    remounted(text, test);
+    let _ = write!(text, "[[test]]\nname = \"{}\"\n", test.name);
+    common(text, bodies, mounts, test);
+    let names: String = test.moving.iter().map(|axis| bodies[*axis].name.as_str()).collect();
+    let Some(last) = test.moving.last().map(|axis| &bodies[*axis]) else { return };
+    if !matches!(test.motion, PlannedMotion::Circle) {
+        text.push_str(
+            "# The axis moves there and back. Adapt the ends to its travel. `runs` repeats both directions.\n",
+        );
+    }
+    let _ = match test.motion {
+        PlannedMotion::Sweep { from, to } => {
+            let step = if last.along == 2 { 2 } else { 1 };
+            writeln!(
+                text,
+                "sweep = {{ axis = \"{names}\", from_deg = {from}, to_deg = {to}, step_deg = {step}, feed_deg_min = 500, runs = 1, both_directions = true }}"
+            )
+        }
+        PlannedMotion::Follow { offset, to } => writeln!(
+            text,
+            "path = {{ kind = \"follow\", axis = \"{names}\", offset = \"{offset}\", from_deg = -{to}, to_deg = {to}, step_deg = 1, feed_deg_min = 300, runs = 1, both_directions = true }}"
+        ),
+        PlannedMotion::Circle => {
+            // Z is the second axis. A table goes down where the spindle ball is above the workpiece ball.
+            let (what, ends) = match (last.along, last.on_table) {
+                (2, false) => ("an arc of 220° above the table", "from_deg = -20, to_deg = 200, "),
+                (2, true) => ("an arc of 220° with the spindle ball above", "from_deg = -200, to_deg = 20, "),
+                _ => ("a full circle from the first towards the second", ""),
+            };
+            writeln!(
+                text,
+                "# Two linear axes, {what} and back. `runs` repeats both directions.\n\
+                 path = {{ kind = \"circle\", plane = \"{names}\", radius_mm = \"R_c\", {ends}step_deg = 2, feed_mm_min = 1000, runs = 1, both_directions = true }}"
+            )
+        }
     };
-    let _ = write!(
-        text,
-        "# Two linear axes, {what} and back. `runs` repeats both directions.\n\
-         path = {{ kind = \"circle\", plane = \"{a}{b}\", radius_mm = \"R_c\", {ends}step_deg = 2, feed_mm_min = 1000, runs = 1, both_directions = true }}\n"
-    );
-    text
 }
 
 /// States that no axis can bring the balls together, so that one is mounted again.
-fn remounted(text: &mut String, setting: &Setting, ball: &str) {
+fn remounted(text: &mut String, PlannedTest { setting, standing, .. }: &PlannedTest) {
+    let ball = if *standing == Side::Tool { "spindle" } else { "workpiece" };
     if setting.remounted_along.is_empty() {
         return;
     }
@@ -256,16 +246,9 @@ fn remounted(text: &mut String, setting: &Setting, ball: &str) {
 }
 
 /// The entries that all tests have: bar, balls, set-ups, priors, and positions of the axes that the test does not move.
-fn common(
-    text: &mut String,
-    bodies: &[Body],
-    extended: bool,
-    mounts: &Mounts,
-    setting: &Setting,
-    moving: &[usize],
-    tilted: Option<&(usize, String)>,
-) {
-    let bar = if extended { "R_e" } else { "R_c" };
+fn common(text: &mut String, bodies: &[Body], mounts: &Mounts, test: &PlannedTest) {
+    let setting = &test.setting;
+    let bar = if test.extended { "R_e" } else { "R_c" };
     let _ = write!(
         text,
         "# Calibrated length.\n\
@@ -285,13 +268,11 @@ fn common(
         s = setting.spindle + 1,
     );
     let linear = setting.at.iter().map(|(name, position)| format!("{}_mm = {}", name.to_lowercase(), position.text()));
-    let rotary =
-        bodies.iter().enumerate().filter(|(index, body)| body.kind == AxisKind::Rotary && !moving.contains(index)).map(
-            |(index, body)| {
-                let deg = tilted.filter(|(other, _)| *other == index).map_or("0", |(_, deg)| deg);
-                format!("{}_deg = {deg}", body.name.to_lowercase())
-            },
-        );
+    let stands = |(index, body): &(usize, &Body)| body.kind == AxisKind::Rotary && !test.moving.contains(index);
+    let rotary = bodies.iter().enumerate().filter(stands).map(|(index, body)| {
+        let deg = test.tilted.filter(|(other, _)| *other == index).map_or(0.0, |(_, deg)| deg);
+        format!("{}_deg = {deg}", body.name.to_lowercase())
+    });
     let at: Vec<String> = linear.chain(rotary).collect();
     if !at.is_empty() {
         let _ = writeln!(

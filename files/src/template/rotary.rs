@@ -13,8 +13,8 @@ use super::body::{Body, Side};
 use super::geometry::{EXTENDED_MM, Geometry, HEAD_TILT_DEG, RADIUS_MM, TABLE_TILT_DEG};
 use super::mounts::{Length, Mounts, Setting, Vector};
 
-/// A test of a rotary axis.
-pub(super) struct RotaryTest {
+/// A test of the plan.
+pub(super) struct PlannedTest {
     /// Its name.
     pub name: String,
     /// What it does, a sentence.
@@ -22,21 +22,27 @@ pub(super) struct RotaryTest {
     /// Whether the bar has its extension.
     pub extended: bool,
     pub setting: Setting,
+    /// The side whose ball does not move.
+    pub standing: Side,
     /// The position of another rotary axis, by index, degrees.
     pub tilted: Option<(usize, f64)>,
-    pub motion: RotaryMotion,
+    /// The axes that it names, by index.
+    pub moving: Vec<usize>,
+    pub motion: PlannedMotion,
 }
 
-/// The motion of a test of a rotary axis, degrees.
-pub(super) enum RotaryMotion {
-    /// The axis alone.
+/// The motion of a test, degrees.
+pub(super) enum PlannedMotion {
+    /// A rotary axis alone.
     Sweep { from: f64, to: f64 },
     /// The linear axes follow it, with the bar in this direction.
     Follow { offset: &'static str, to: f64 },
+    /// Two linear axes on a circle.
+    Circle,
 }
 
 /// The tests of the rotary axis `turning`; none if no bar can be set up for it.
-pub(super) fn tests(mounts: &mut Mounts, bodies: &[Body], turning: usize, geometry: &Geometry) -> Vec<RotaryTest> {
+pub(super) fn tests(mounts: &mut Mounts, bodies: &[Body], turning: usize, geometry: &Geometry) -> Vec<PlannedTest> {
     let axis = &bodies[turning];
     let on_table = axis.side() == Side::Workpiece;
     match (on_table, axis.along == 2) {
@@ -88,7 +94,7 @@ fn usable(bodies: &[Body], turning: usize) -> Vec<usize> {
 }
 
 /// Sweeps of an axis of the table about the spindle ball on it.
-fn of_table(mounts: &mut Mounts, bodies: &[Body], turning: usize, [from, to]: [f64; 2]) -> Vec<RotaryTest> {
+fn of_table(mounts: &mut Mounts, bodies: &[Body], turning: usize, [from, to]: [f64; 2]) -> Vec<PlannedTest> {
     let axis = &bodies[turning];
     let workpiece = mounts.beside(axis);
     let ball = mounts.workpiece[workpiece];
@@ -99,7 +105,7 @@ fn of_table(mounts: &mut Mounts, bodies: &[Body], turning: usize, [from, to]: [f
             // Beside and above the axis the ball is at the radius.
             _ => lift(Length::RADIUS, extended),
         };
-        RotaryTest {
+        PlannedTest {
             name: named(&axis.name, extended),
             about: format!(
                 "{} turns the workpiece ball about the spindle ball, which is {}.",
@@ -108,15 +114,17 @@ fn of_table(mounts: &mut Mounts, bodies: &[Body], turning: usize, [from, to]: [f
             ),
             extended,
             setting: mounts.placed(bodies, [workpiece, 0], wanted, &usable(bodies, turning), Side::Tool),
+            standing: Side::Tool,
             tilted: None,
-            motion: RotaryMotion::Sweep { from, to },
+            moving: vec![turning],
+            motion: PlannedMotion::Sweep { from, to },
         }
     };
     vec![test(false), test(true)]
 }
 
 /// Paths on which the linear axes keep the bar radial and axial while a rotary axis turns.
-fn followed(mounts: &mut Mounts, bodies: &[Body], turning: usize, tilt_deg: f64) -> Vec<RotaryTest> {
+fn followed(mounts: &mut Mounts, bodies: &[Body], turning: usize, tilt_deg: f64) -> Vec<PlannedTest> {
     let spans = |along: usize| bodies.iter().any(|own| own.kind == AxisKind::Linear && own.along == along);
     if !(0..3).all(spans) {
         return Vec::new();
@@ -132,7 +140,7 @@ fn followed(mounts: &mut Mounts, bodies: &[Body], turning: usize, tilt_deg: f64)
         wanted[axis.along] = if on_table { apart } else { apart.negative() };
         let mut setting = mounts.placed(bodies, [workpiece, 0], wanted, &all, Side::Tool);
         setting.at.retain(|(name, _)| bodies.iter().any(|own| own.name == *name && own.along == axis.along));
-        RotaryTest {
+        PlannedTest {
             name: format!("{} {offset}", axis.name),
             about: format!(
                 "The linear axes follow {} with the bar {offset}, so that the {sees} of the axis changes the readings.",
@@ -140,15 +148,17 @@ fn followed(mounts: &mut Mounts, bodies: &[Body], turning: usize, tilt_deg: f64)
             ),
             extended: false,
             setting,
+            standing: if on_table { Side::Tool } else { Side::Workpiece },
             tilted: None,
-            motion: RotaryMotion::Follow { offset, to: tilt_deg },
+            moving: vec![turning],
+            motion: PlannedMotion::Follow { offset, to: tilt_deg },
         }
     };
     vec![test("radial", "position", Length::ZERO), test("axial", "orientation", Length::RADIUS)]
 }
 
 /// Sweeps of a vertical axis of the head about the workpiece ball on it.
-fn of_vertical_head(mounts: &mut Mounts, bodies: &[Body], turning: usize, geometry: &Geometry) -> Vec<RotaryTest> {
+fn of_vertical_head(mounts: &mut Mounts, bodies: &[Body], turning: usize, geometry: &Geometry) -> Vec<PlannedTest> {
     let axis = &bodies[turning];
     let tilting = (turning + 1..bodies.len()).find(|k| bodies[*k].kind == AxisKind::Rotary && bodies[*k].along != 2);
     let tilt_deg = geometry.tilted_head_deg();
@@ -171,7 +181,7 @@ fn of_vertical_head(mounts: &mut Mounts, bodies: &[Body], turning: usize, geomet
         let wanted = [beside[0], beside[1], lift(out, extended)];
         // The placing has no tilt.
         let wanted: Vector = std::array::from_fn(|d| wanted[d].plus(moved[d].negative()));
-        RotaryTest {
+        PlannedTest {
             name: named(&axis.name, extended),
             about: format!(
                 "{} turns the spindle ball about the workpiece ball, which is {}.",
@@ -180,8 +190,10 @@ fn of_vertical_head(mounts: &mut Mounts, bodies: &[Body], turning: usize, geomet
             ),
             extended,
             setting: mounts.placed(bodies, [0, spindle], wanted, &usable(bodies, turning), Side::Workpiece),
+            standing: Side::Workpiece,
+            moving: vec![turning],
             tilted: tilting.map(|tilting| (tilting, tilt_deg)),
-            motion: RotaryMotion::Sweep { from: -180.0, to: 180.0 },
+            motion: PlannedMotion::Sweep { from: -180.0, to: 180.0 },
         }
     };
     vec![test(false), test(true)]
