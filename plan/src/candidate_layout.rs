@@ -2,9 +2,7 @@
 
 use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
-use abbe_model::instrument::Station;
 use abbe_model::instrument::ballbar::{BAR, BallBar};
-use abbe_model::session::expression::Length;
 use abbe_model::session::motion::{Course, FollowOffset, Motion, Moved, Traversals};
 use abbe_model::session::{Prior, Session, Test, placing};
 use abbe_model::words::{counted, listed};
@@ -179,30 +177,15 @@ impl Choice<'_> {
         if !self.ball.new {
             name.push_str(&format!(" ({ball} as in {})", self.ball.setup));
         }
-        let station: Station<f64> = station.into();
-        let geometry = station.map(|length| Length::Number(*length));
-        let unique = "proposed".to_string();
+        let unique = "proposed";
         let setup = match (self.on_table, self.ball.new) {
             (true, false) => self.ball.setup.clone(),
-            (true, true) => unique.clone(),
+            (true, true) => unique.to_string(),
             (false, _) => self.last.setup.clone(),
         };
         let priors = self.priors(nominal);
-        let test = Test {
-            name: unique.clone(),
-            station,
-            geometry,
-            priors,
-            setup,
-            spindle_setup: unique.clone(),
-            bar_setup: unique,
-            socket: None,
-            motion: Some(motion),
-            at_written: vec![None; at.len()],
-            at,
-            contributors: None,
-            readings: None,
-        };
+        let proposed = Test::new(unique, station.into(), at.len());
+        let test = Test { priors, setup, motion: Some(motion), at, ..proposed };
         Draft { test, name, new_setup: self.ball.new }
     }
 

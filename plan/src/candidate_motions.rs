@@ -21,7 +21,6 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::{Following, InstrumentKind, Station, Target, Travel};
-use abbe_model::session::expression::Length;
 use abbe_model::session::motion::{Course, FollowOffset, Motion, Moved, Traversals};
 use abbe_model::session::{Prior, Session, Test, placing};
 use abbe_model::words::{listed, number};
@@ -282,21 +281,9 @@ impl Template<'_> {
     ) -> Draft {
         let mut priors: Vec<Prior> = self.test.priors.clone();
         station.absent_channels_known(&mut priors);
-        let test = Test {
-            name: PROPOSED.to_string(),
-            geometry: station.map(|length| Length::Number(*length)),
-            station,
-            priors,
-            setup,
-            spindle_setup,
-            bar_setup: PROPOSED.to_string(),
-            socket: None,
-            motion: Some(motion),
-            at_written: vec![None; at.len()],
-            at,
-            contributors: self.test.contributors,
-            readings: None,
-        };
+        let contributors = self.test.contributors;
+        let proposed = Test::new(PROPOSED, station, at.len());
+        let test = Test { priors, setup, spindle_setup, motion: Some(motion), at, contributors, ..proposed };
         Draft { test, name: words, new_setup }
     }
 

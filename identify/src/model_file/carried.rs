@@ -11,9 +11,8 @@ use abbe_model::component::ErrorName;
 use abbe_model::effect::{Component, Effect};
 use abbe_model::instrument::Station;
 use abbe_model::sensitivity::{SlotValues, TestModel};
-use abbe_model::session::expression::Length;
 use abbe_model::session::readings::Readings;
-use abbe_model::session::{Prior, Session, Test};
+use abbe_model::session::{Session, Test};
 
 use super::IdentifiedModel;
 use super::errors::{EstimatedErrors, MachineErrors};
@@ -109,21 +108,8 @@ impl IdentifiedModel {
         let machine = Arc::new(self.machine.clone());
         let model = TestModel::new(Arc::clone(&machine), station.clone(), &states.readings);
         let session = self.session(&Session::new(self.machine.clone(), station.kind()));
-        let test = Test {
-            name: String::new(),
-            geometry: station.map(|length| Length::Number(*length)),
-            priors: vec![Prior::Known; station.kind().unknowns().len()],
-            station,
-            setup: String::new(),
-            spindle_setup: String::new(),
-            bar_setup: String::new(),
-            socket: None,
-            motion: None,
-            at: vec![0.0; self.machine.axes.len()],
-            at_written: vec![None; self.machine.axes.len()],
-            contributors: None,
-            readings: Some(Arc::new(states.readings.clone())),
-        };
+        let readings = Some(Arc::new(states.readings.clone()));
+        let test = Test { readings, ..Test::new("", station, self.machine.axes.len()) };
         let (tests, models) = (vec![test], vec![model]);
         let mut parameters = Parameters::declared(&session, &tests, &models)?;
         for effect in &session.effects {

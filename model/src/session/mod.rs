@@ -247,6 +247,25 @@ pub struct Test {
 }
 
 impl Test {
+    /// A test without readings in which all axes stand at zero. Its set-up is exactly known, and no other test has it.
+    pub fn new(name: &str, station: Station<f64>, axes: usize) -> Test {
+        Test {
+            name: name.to_string(),
+            geometry: station.map(|length| expression::Length::Number(*length)),
+            priors: vec![Prior::Known; station.kind().unknowns().len()],
+            station,
+            setup: name.to_string(),
+            spindle_setup: name.to_string(),
+            bar_setup: name.to_string(),
+            socket: None,
+            motion: None,
+            at: vec![0.0; axes],
+            at_written: vec![None; axes],
+            contributors: None,
+            readings: None,
+        }
+    }
+
     /// The name of the group of tests that shares a parameter: the `setup`, the `bar_setup`, …; empty for the whole
     /// session.
     pub fn group(&self, by: SharedBy) -> &str {
