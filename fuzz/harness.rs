@@ -104,7 +104,7 @@ pub fn session(input: &[u8]) {
         // The rewritten form of a valid session is a valid session.
         let mut again = SessionText::new(text, file).expect("it was read");
         again.set_machine_file("machine.toml");
-        again.set_noise(0.5);
+        again.set_of_instrument("noise_um", 0.5);
         again.add_effects(&session.effects, &session.machine).expect("it was read");
         again.remove(&["effect"]);
         assert!(!again.to_string().contains("[[effect]]\ncomponent"));

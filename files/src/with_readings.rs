@@ -54,10 +54,10 @@ pub fn with_readings(
     text.set_data(&data);
     text.set_machine_file("machine.toml");
     if let Some(noise_um) = changes.noise_um {
-        text.set_noise(noise_um);
+        text.set_of_instrument("noise_um", noise_um);
     }
     if let Some(noise_arcsec) = changes.noise_arcsec {
-        text.set_noise_of_angles(noise_arcsec);
+        text.set_of_instrument("noise_arcsec", noise_arcsec);
     }
     // The data files have the standard columns, whatever the columns of the original.
     text.remove(&["format", "columns"]);

@@ -304,11 +304,11 @@ impl Session {
             let mut sources = SourceMap { files: Vec::new(), ..state.sources.clone() };
             if let Some(noise_um) = noise_um {
                 session.noise_mm = noise_mm;
-                sources.text.set_noise(noise_um);
+                sources.text.set_of_instrument("noise_um", noise_um);
             }
             if let Some(noise_arcsec) = noise_arcsec {
                 session.noise_rad = noise_rad;
-                sources.text.set_noise_of_angles(noise_arcsec);
+                sources.text.set_of_instrument("noise_arcsec", noise_arcsec);
             }
             if hide_effects {
                 session.effects.clear();

@@ -90,17 +90,8 @@ impl SessionText {
         }
     }
 
-    /// States the noise of lengths, µm.
-    pub fn set_noise(&mut self, noise_um: f64) {
-        self.set_of_instrument("noise_um", noise_um);
-    }
-
-    /// States the noise of angles, arcsec.
-    pub fn set_noise_of_angles(&mut self, noise_arcsec: f64) {
-        self.set_of_instrument("noise_arcsec", noise_arcsec);
-    }
-
-    fn set_of_instrument(&mut self, key: &str, number: f64) {
+    /// States a number of the instrument, such as `noise_um`.
+    pub fn set_of_instrument(&mut self, key: &str, number: f64) {
         match value_in(&mut self.document, &["instrument", key]) {
             Some(value) => replace(value, number_of(number)),
             None => {
@@ -148,16 +139,8 @@ impl SessionText {
     /// may name others.
     pub fn keep_tests(&mut self, is_kept: &dyn Fn(&str) -> bool) {
         self.document.remove("socket_distance");
-        match self.document.get_mut("test") {
-            Some(Item::ArrayOfTables(tests)) => {
-                tests.retain(|test| test.get("name").and_then(Item::as_str).is_some_and(is_kept));
-            }
-            Some(Item::Value(Value::Array(tests))) => {
-                let name_of = |test: &Value| test.as_inline_table()?.get("name")?.as_str().map(str::to_string);
-                tests.retain(|test| name_of(test).is_some_and(|name| is_kept(&name)));
-            }
-            _ => {}
-        }
+        let name_of = |test: &dyn TableLike| test.get("name").and_then(Item::as_str).map(str::to_string);
+        retain(&mut self.document, "test", &|test| name_of(test).is_some_and(|name| is_kept(&name)));
         for mut effect in tables(&mut self.document, "effect") {
             if let Some(Item::Value(Value::Array(tests))) = effect.table().get_mut("tests") {
                 tests.retain(|test| test.as_str().is_none_or(is_kept));
@@ -167,13 +150,7 @@ impl SessionText {
             Some(tests) => !tests.is_empty(),
             None => true,
         };
-        match self.document.get_mut("effect") {
-            Some(Item::ArrayOfTables(effects)) => effects.retain(|effect| acts(effect)),
-            Some(Item::Value(Value::Array(effects))) => {
-                effects.retain(|effect| effect.as_inline_table().is_none_or(|effect| acts(effect)));
-            }
-            _ => {}
-        }
+        retain(&mut self.document, "effect", &acts);
     }
 
     /// Removes keys of all tests.
@@ -386,6 +363,17 @@ fn tables<'d>(document: &'d mut DocumentMut, list: &str) -> Vec<Place<'d>> {
     }
 }
 
+/// Keeps some tables of a list.
+fn retain(document: &mut DocumentMut, list: &str, is_kept: &dyn Fn(&dyn TableLike) -> bool) {
+    match document.get_mut(list) {
+        Some(Item::ArrayOfTables(tables)) => tables.retain(|table| is_kept(table)),
+        Some(Item::Value(Value::Array(items))) => {
+            items.retain(|item| item.as_inline_table().is_some_and(|table| is_kept(table)));
+        }
+        _ => {}
+    }
+}
+
 /// Replaces a value; the space and the comment around it stay.
 fn replace(value: &mut Value, new: impl Into<Value>) {
     let decor = value.decor().clone();
@@ -436,11 +424,11 @@ mod tests {
     fn other_text_is_unchanged() {
         let text = edited(SESSION, |text| text.set_machine_file("machine.toml"));
         assert_eq!(text, SESSION.replace("../machine.toml", "machine.toml"));
-        let text = edited(SESSION, |text| text.set_noise(0.25));
+        let text = edited(SESSION, |text| text.set_of_instrument("noise_um", 0.25));
         assert_eq!(text, SESSION.replace("# Renishaw\n", "# Renishaw\nnoise_um = 0.25\n"));
-        let text = edited(&text, |text| text.set_noise(0.0));
+        let text = edited(&text, |text| text.set_of_instrument("noise_um", 0.0));
         assert!(text.ends_with("\nnoise_um = 0\n"), "{text}");
-        let inline = edited("instrument = { kind = \"ballbar\" }\n", |text| text.set_noise(1.5));
+        let inline = edited("instrument = { kind = \"ballbar\" }\n", |text| text.set_of_instrument("noise_um", 1.5));
         assert_eq!(inline, "instrument = { kind = \"ballbar\", noise_um = 1.5 }\n");
     }
 

@@ -77,38 +77,24 @@ impl<T> JsonSchema for Block<T> {
 /// # Errors
 /// As [`text_of`].
 pub fn json_of(document: &impl Serialize) -> Result<serde_json::Value, Diagnostic> {
-    Ok(json(value_of(document)?))
+    value_of(document).map(|value| serde_json::Value::from(&node(value)))
 }
 
 /// A document as a tree of values; `None` if a value has no form in TOML.
 pub(crate) fn node_of(document: &impl Serialize) -> Option<Node> {
-    fn node(value: Value) -> Node {
-        match value {
-            Value::String(text) => text.value().as_str().into(),
-            Value::Integer(number) => (*number.value() as f64).into(),
-            Value::Float(number) => (*number.value()).into(),
-            Value::Boolean(truth) => (*truth.value()).into(),
-            Value::Datetime(date) => node::Value::Date(date.to_string()).into(),
-            Value::Array(items) => items.into_iter().map(node).collect(),
-            Value::InlineTable(table) => {
-                Node::table(table.into_iter().map(|(key, value)| (key.to_string(), node(value))))
-            }
-        }
-    }
     value_of(document).ok().map(node)
 }
 
-fn json(value: Value) -> serde_json::Value {
+/// A value as a tree.
+fn node(value: Value) -> Node {
     match value {
-        Value::String(text) => text.into_value().into(),
-        Value::Integer(number) => number.into_value().into(),
-        Value::Float(number) => number.into_value().into(),
-        Value::Boolean(truth) => truth.into_value().into(),
-        Value::Datetime(date) => date.to_string().into(),
-        Value::Array(items) => items.into_iter().map(json).collect(),
-        Value::InlineTable(table) => {
-            serde_json::Value::Object(table.into_iter().map(|(key, value)| (key.to_string(), json(value))).collect())
-        }
+        Value::String(text) => text.value().as_str().into(),
+        Value::Integer(number) => (*number.value() as f64).into(),
+        Value::Float(number) => (*number.value()).into(),
+        Value::Boolean(truth) => (*truth.value()).into(),
+        Value::Datetime(date) => node::Value::Date(date.to_string()).into(),
+        Value::Array(items) => items.into_iter().map(node).collect(),
+        Value::InlineTable(table) => Node::table(table.into_iter().map(|(key, value)| (key.to_string(), node(value)))),
     }
 }
 
