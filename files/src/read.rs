@@ -8,14 +8,12 @@ use abbe_model::document::edit::SessionText;
 use abbe_model::document::effect;
 use abbe_model::document::fault::{Fault, Step, Within};
 use abbe_model::document::machine as machine_document;
-use abbe_model::document::measurement::Test;
 use abbe_model::document::node::Node;
 use abbe_model::document::session::{MachineFile, Session as Document, SessionMachine};
 use abbe_model::effect::Effect;
 use abbe_model::instrument::InstrumentParameter;
 use abbe_model::session::Session;
 use schemars::JsonSchema;
-use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::access::{self, ReadOptions};
@@ -24,7 +22,7 @@ use super::stamp::FileStamp;
 use super::store::Store;
 use super::table::memory::MemoryColumn;
 use crate::lower::body::BodyFiles;
-use crate::lower::{self, Data, Parts, Surroundings};
+use crate::lower::{self, Data, Surroundings};
 use crate::source::{Parsed, Source};
 
 /// Reads the text of another file in the same way: UTF-8 with or without byte order mark, of a limited size, unchanged
@@ -176,7 +174,7 @@ pub fn session_of(source: &Source, options: &ReadOptions) -> Result<(Session, So
             parsed.location_of(&path.collect::<Vec<_>>())
         },
     };
-    let found = lower::add(&mut session, (&document).into(), &surroundings).map_err(here)?;
+    let found = lower::add(&mut session, &document.parts, &surroundings).map_err(here)?;
     if session.tests.is_empty() {
         return Err(Diagnostic::input(Location::file(path), "a session without tests", "add at least one [[test]]"));
     }
@@ -257,7 +255,7 @@ fn plan_in(source: &Parsed<'_>) -> Result<Session, Diagnostic> {
         };
         let machine = lower::machine(tables, &mut BodyFiles::default()).within("machine")?;
         let mut session = lower::head(machine, &document, &|_| None)?;
-        lower::add(&mut session, (&document).into(), &in_memory(Data::None, &ReadOptions::default()))?;
+        lower::add(&mut session, &document.parts, &in_memory(Data::None, &ReadOptions::default()))?;
         Ok(session)
     };
     read().map_err(|fault| source.error_of(fault))
@@ -302,19 +300,8 @@ pub fn add_node(
     columns: &[MemoryColumn<'_>],
 ) -> Result<(), Diagnostic> {
     let source = Parsed::of_node(Node::table([(list.to_string(), Node::from_iter([entry]))]));
-    let Additions { test, effect, socket_distance } = &source.document()?;
-    let parts = Parts { test, effect, socket_distance, ..Parts::default() };
-    let added = lower::add(session, parts, &in_memory(Data::Columns(columns), &ReadOptions::default()));
+    let added = lower::add(session, &source.document()?, &in_memory(Data::Columns(columns), &ReadOptions::default()));
     added.map(|_| ()).map_err(|fault| source.error_of(fault))
-}
-
-/// The lists of a session that a program extends.
-#[derive(Default, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-struct Additions {
-    test: Vec<Test>,
-    effect: Vec<effect::Effect>,
-    socket_distance: Vec<Node>,
 }
 
 fn in_memory<'a>(data: Data<'a>, options: &'a ReadOptions) -> Surroundings<'a> {

@@ -1,5 +1,10 @@
 //! Bodies of a machine: shapes that move with an axis, for checks of clearance. They take no part in the chain.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::document::value::{NotNegative, Positive};
+
 /// A body of a machine. Its shape is in R with all axes at zero, mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
@@ -38,31 +43,40 @@ pub enum BodyShape {
     },
 }
 
-/// Sizes of a ball bar and of what holds its balls, for checks of clearance, mm.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Sizes of the ball bar for checks of clearance.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename = "clearance", default, deny_unknown_fields)]
 pub struct ClearanceSizes {
-    /// Radius of the bar.
-    pub bar_radius_mm: f64,
-    /// The stem below the workpiece ball, along −Z of the table frame: radius and length.
+    /// Radius of the bar; default 10.
+    pub bar_radius_mm: Positive,
+    /// The stem below the workpiece ball, along -Z of the table frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub workpiece_holder: Option<Holder>,
-    /// The stem above the spindle ball, along Z of the tool frame: radius and length.
+    /// The stem above the spindle ball, along Z of the tool frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub spindle_holder: Option<Holder>,
-    /// Least clearance of a proposed test.
-    pub least_mm: f64,
+    /// Least clearance of a proposed test; less causes a warning. Default 5.
+    pub least_mm: NotNegative,
 }
 
-/// A stem that holds a ball, from its centre, mm.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A stem that holds a ball.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename = "holder", deny_unknown_fields)]
 pub struct Holder {
-    /// Radius.
-    pub radius_mm: f64,
-    /// Length.
-    pub length_mm: f64,
+    /// Radius of the stem.
+    pub radius_mm: Positive,
+    /// Its length from the centre of the ball.
+    pub length_mm: Positive,
 }
 
 impl Default for ClearanceSizes {
     /// A bar of 10 mm radius, no holders, 5 mm of clearance.
     fn default() -> Self {
-        ClearanceSizes { bar_radius_mm: 10.0, workpiece_holder: None, spindle_holder: None, least_mm: 5.0 }
+        ClearanceSizes {
+            bar_radius_mm: Positive(10.0),
+            workpiece_holder: None,
+            spindle_holder: None,
+            least_mm: NotNegative(5.0),
+        }
     }
 }

@@ -6,7 +6,6 @@ use abbe_identify::model_file::{IdentifiedModel, ModelParameter, Provenance};
 use abbe_identify::noise::{Noise, NoiseSource};
 use abbe_identify::results::ModelFit;
 use abbe_model::chain::{AxisPosition, Frame, Machine};
-use abbe_model::document::kind::Kind;
 use abbe_model::frames::Point;
 use abbe_model::unit::Unit;
 use faer::Mat;
@@ -42,7 +41,7 @@ pub(super) fn model(machine: Machine, errors: &[(String, f64)]) -> IdentifiedMod
         schema_version: SCHEMA_VERSION,
         sha256: String::new(),
         machine,
-        instrument: Kind("tracker".parse().unwrap()),
+        instrument: "tracker".parse().unwrap(),
         effects: Vec::new(),
         parameters,
         covariance: Mat::from_fn(count, count, |i, j| if i == j { 1e-6 } else { 0.0 }),

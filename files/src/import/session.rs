@@ -157,7 +157,7 @@ impl Draft {
         let folders = [options.data_directory.as_deref(), Some(access::folder(file))];
         let is_there =
             |data: &str| folders.iter().flatten().any(|folder| options.store.open(&folder.join(data)).is_ok());
-        let lacking: BTreeSet<String> = (document.test.iter())
+        let lacking: BTreeSet<String> = (document.parts.test.iter())
             .filter(|test| test.data.as_deref().is_some_and(|data| !is_there(data)))
             .map(|test| test.name.clone())
             .collect();
@@ -166,7 +166,7 @@ impl Draft {
         let mut stamps = read::session_of(&source, &planned)?.1.files;
         if lacking.is_empty() {
             stamps.extend(read::session_of(&source, options)?.1.files);
-        } else if lacking.len() < document.test.len() {
+        } else if lacking.len() < document.parts.test.len() {
             let mut present = text.clone();
             present.keep_tests(&|name| !lacking.contains(name));
             stamps.extend(read::session_of(&Text::new(file, &present.to_string()), options)?.1.files);
@@ -180,7 +180,7 @@ impl Draft {
         let (imported, awaited): (BTreeSet<String>, BTreeSet<String>) = lacking.into_iter().partition(is_new);
         let of_stamps =
             existing.keys().filter_map(|path: &PathBuf| Some(path.file_name()?.to_string_lossy().to_lowercase()));
-        let others = document.test.iter().filter(|test| !imported.contains(&test.name));
+        let others = document.parts.test.iter().filter(|test| !imported.contains(&test.name));
         let of_tests = others.filter_map(|test| Some(test.data.as_ref()?.to_lowercase()));
         let taken = of_stamps.chain(of_tests).collect();
         let mut draft = Draft {
@@ -190,14 +190,14 @@ impl Draft {
             taken,
             awaited,
             new: Vec::new(),
-            states_layout: document.format.is_some() || document.columns.is_some(),
+            states_layout: document.parts.format.is_some() || document.parts.columns.is_some(),
             unknown_target: None,
             is_new: false,
         };
         let mut tests = Vec::new();
         for name in names {
             let same = |test: &&Test| test.name.to_lowercase() == name.to_lowercase();
-            match document.test.iter().find(same) {
+            match document.parts.test.iter().find(same) {
                 Some(planned) if planned.data.is_none() || imported.contains(&planned.name) => {
                     if like.is_some() || !set.entries().is_empty() {
                         let message =
@@ -238,22 +238,22 @@ impl Draft {
     /// The test whose set-up a new one has, by its number.
     fn set_up_of(&self, document: &Document, name: &str, like: Option<&str>) -> Result<usize, Diagnostic> {
         if let Some(like) = like {
-            return document.test.iter().position(|test| test.name == like).ok_or_else(|| {
-                let names: Vec<&str> = document.test.iter().map(|test| test.name.as_str()).collect();
+            return document.parts.test.iter().position(|test| test.name == like).ok_or_else(|| {
+                let names: Vec<&str> = document.parts.test.iter().map(|test| test.name.as_str()).collect();
                 self.fault(
                     format!("the session has no test \"{like}\""),
                     &format!("its tests are {}", names.join(", ")),
                 )
             });
         }
-        let [first, others @ ..] = &document.test[..] else {
+        let [first, others @ ..] = &document.parts.test[..] else {
             return Err(self.fault("a session without tests".into(), "import with the machine alone"));
         };
         let same = |other: &Test| other.set_up == first.set_up && other.kind == first.kind && other.at == first.at;
         if others.iter().all(same) {
             return Ok(0);
         }
-        let names: Vec<&str> = document.test.iter().map(|test| test.name.as_str()).collect();
+        let names: Vec<&str> = document.parts.test.iter().map(|test| test.name.as_str()).collect();
         let help = format!(
             "name the file as a planned test without data, or say which test has the same set-up: {}",
             names.join(", ")

@@ -1,12 +1,12 @@
-//! What can collide: the bodies of a machine, the sizes of a ball bar.
+//! What can collide: the bodies of a machine.
 
 use std::path::Path;
 
-use abbe_model::body::{Body, BodyShape, ClearanceSizes, Holder};
+use abbe_model::body::{Body, BodyShape};
 use abbe_model::chain::Machine;
 use abbe_model::document::fault::{Fault, Within};
+use abbe_model::document::machine as document;
 use abbe_model::document::value::Vector;
-use abbe_model::document::{machine as document, session};
 
 use crate::access::{self, ReadOptions};
 use crate::source_map::BodyFile;
@@ -101,17 +101,5 @@ fn cuboid(corners: &[Vector]) -> Result<BodyShape, Fault> {
         [low, high] if (0..3).all(|i| low.0[i] < high.0[i]) => Ok(BodyShape::Box { low_mm: low.0, high_mm: high.0 }),
         [_, _] => Err(fault("`box_mm`: a coordinate of the second corner is not greater than that of the first")),
         _ => Err(fault("`box_mm` is not a list of two corners")),
-    }
-}
-
-/// The sizes of a ball bar.
-pub(super) fn clearance(document: &session::Clearance) -> ClearanceSizes {
-    let usual = ClearanceSizes::default();
-    let holder = |holder: session::Holder| Holder { radius_mm: holder.radius_mm.0, length_mm: holder.length_mm.0 };
-    ClearanceSizes {
-        bar_radius_mm: document.bar_radius_mm.map_or(usual.bar_radius_mm, |radius| radius.0),
-        workpiece_holder: document.workpiece_holder.map(holder),
-        spindle_holder: document.spindle_holder.map(holder),
-        least_mm: document.least_mm.map_or(usual.least_mm, |least| least.0),
     }
 }

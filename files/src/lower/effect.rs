@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use abbe_model::chain::Machine;
 use abbe_model::component::ErrorKind;
 use abbe_model::diagnostic::Help;
 use abbe_model::document::effect::{self as document, SCALES};
@@ -12,21 +13,28 @@ use abbe_model::driver::{Driver, column};
 use abbe_model::effect::keys::KeyReader;
 use abbe_model::effect::shape::{Entry, SHAPES};
 use abbe_model::effect::{CoefficientPrior, Component, Effect, EffectPart, Shape};
-use abbe_model::instrument::InstrumentParameter;
+use abbe_model::instrument::{InstrumentKind, InstrumentParameter};
 use abbe_model::session::limits::MIN_UM;
 use abbe_model::words::{self, listed, with_article};
 
-use super::{Context, Declared};
+use super::Declared;
 use crate::axes;
 use crate::spelling::known_names;
 
-/// The effect with its aliases; `columns` are the driver columns of the data, `NAME_unit`.
-pub(super) fn effect(
-    context: &Context<'_>,
-    declared: &[Declared],
-    columns: &BTreeSet<String>,
-    document: &document::Effect,
-) -> Result<Effect, Fault> {
+/// What effects refer to.
+pub(super) struct Context<'a> {
+    pub machine: &'a Machine,
+    /// The instrument of the session.
+    pub instrument: InstrumentKind,
+    /// The parameters of the instruments of the tests.
+    pub of_instruments: &'a [InstrumentParameter],
+    pub declared: &'a [Declared],
+    /// The driver columns of the data, `NAME_unit`.
+    pub columns: BTreeSet<String>,
+}
+
+/// The effect with its aliases.
+pub(super) fn effect(context: &Context<'_>, document: &document::Effect) -> Result<Effect, Fault> {
     let alias = |alias: &document::Effect| {
         let own = [
             ("alias", !alias.alias.is_empty()),
@@ -38,14 +46,14 @@ pub(super) fn effect(
                 let known = schema::fields::<document::Effect>().into_iter();
                 Err(Fault::unknown_key(key, known.filter(|key| own.iter().all(|(own, _)| own != key)).collect()))
             }
-            None => one(context, declared, columns, alias),
+            None => one(context, alias),
         }
     };
     let aliases = document.alias.iter().enumerate();
     let aliases = aliases.map(|(item, document)| alias(document).within_item(item));
     let aliases = aliases.collect::<Result<_, _>>().within("alias")?;
     let assumed = document.assumed.unwrap_or_default();
-    let effect = one(context, declared, columns, document)?;
+    let effect = one(context, document)?;
     let names = document.estimate.as_deref().unwrap_or_default();
     let mut estimated = estimated(&effect.shape, names).within("estimate")?;
     let numbers = effect.shape.number_names().len();
@@ -83,16 +91,11 @@ fn estimated(shape: &Shape, names: &[String]) -> Result<Vec<usize>, Fault> {
 }
 
 /// An effect without its aliases.
-fn one(
-    context: &Context<'_>,
-    declared: &[Declared],
-    columns: &BTreeSet<String>,
-    document: &document::Effect,
-) -> Result<Effect, Fault> {
+fn one(context: &Context<'_>, document: &document::Effect) -> Result<Effect, Fault> {
     let component = component(context, &document.component).within("component")?;
     let word = &document.shape;
     let entry = Shape::entry_of(word);
-    let driver = driver(context, document.driver.as_deref(), &component, entry, columns)?;
+    let driver = driver(context, document.driver.as_deref(), &component, entry)?;
     let Some(entry) = entry else {
         let words: Vec<&str> = SHAPES.iter().map(|entry| entry.word).collect();
         let message = format!("\"{word}\" is not a shape");
@@ -118,8 +121,8 @@ fn one(
                     driver that axis, such as EAC over C";
         return Err(Fault::new(message, help).at("shape"));
     }
-    let tests = tests(document.tests.as_deref().unwrap_or_default(), declared).within("tests")?;
-    let prior = prior(document, &component, &shape, &context.of_instruments)?;
+    let tests = tests(document.tests.as_deref().unwrap_or_default(), context.declared).within("tests")?;
+    let prior = prior(document, &component, &shape, context.of_instruments)?;
     shape.check().map_err(|fault| Fault::new(fault, None).at("shape"))?;
     Ok(Effect { tests, prior, ..Effect::new(component, driver, shape) })
 }
@@ -169,7 +172,6 @@ fn driver(
     stated: Option<&str>,
     component: &Component,
     shape: Option<&Entry>,
-    columns: &BTreeSet<String>,
 ) -> Result<Driver, Fault> {
     let Some(text) = stated else {
         return match (shape.and_then(|entry| entry.follows.default_driver()), component) {
@@ -184,13 +186,13 @@ fn driver(
     };
     let axis = axes::axis_index(context.machine, text);
     // A column may be named without its unit if no other column has its name.
-    let of_quantity: Vec<&String> = columns.iter().filter(|name| column::quantity(name) == text).collect();
+    let of_quantity: Vec<&String> = context.columns.iter().filter(|name| column::quantity(name) == text).collect();
     let driver = match (Driver::parse(text), axis, &of_quantity[..]) {
         (Driver::Axis(_) | Driver::Column(_), Some(index), _) => Driver::Axis(context.machine.axes[index].name.clone()),
         (Driver::Axis(_), None, [name]) => Driver::Column((*name).clone()),
         (Driver::Axis(_), None, _) => {
             let (message, help) = axes::no_axis(context.machine, text);
-            let columns = columns.iter().map(String::as_str);
+            let columns = context.columns.iter().map(String::as_str);
             let others: Vec<&str> = Driver::words().into_iter().chain(columns).collect();
             let help = format!("{help}; other drivers are {}, and columns as NAME_unit", listed(&others, "and"));
             return Err(Fault::new(format!("effect driven by \"{text}\": {message}"), help).at("driver"));

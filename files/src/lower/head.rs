@@ -5,7 +5,6 @@ use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::document::fault::{Fault, Within};
 use abbe_model::document::from_node;
-use abbe_model::document::kind::Kind;
 use abbe_model::document::node::{Entries, Named, Node, Value};
 use abbe_model::document::session as document;
 use abbe_model::document::value::{NotNegative, Note};
@@ -13,7 +12,7 @@ use abbe_model::instrument::{InstrumentKind, SharedBy};
 use abbe_model::pattern;
 use abbe_model::session::expression::Constant;
 use abbe_model::session::{SocketDistance, Test, limits};
-use abbe_model::unit::{MM_PER_UM, RAD_PER_ARCSEC};
+use abbe_model::unit::{MM_PER_UM, Unit};
 use abbe_model::words::with_article;
 
 use crate::axes;
@@ -57,33 +56,19 @@ pub(super) fn constants(entries: &Entries, comment: impl Fn(&str) -> Option<Stri
     entries.0.iter().map(constant).collect()
 }
 
-/// The kind of the instrument, and noise and resolution of its channels.
-pub(super) struct Instrument {
-    pub kind: InstrumentKind,
-    pub noise_mm: Option<f64>,
-    pub noise_rad: Option<f64>,
-    pub resolution_mm: Option<f64>,
-    pub resolution_rad: Option<f64>,
-}
-
-pub(super) fn instrument(document: &document::Instrument) -> Result<Instrument, Fault> {
-    let Kind(kind) = document.kind;
-    let in_mm = |um: Option<NotNegative>, key: &str| {
-        let mm = um.map(|NotNegative(um)| limits::too_small_um(um).map_or(Ok(um * MM_PER_UM), Err));
-        mm.transpose().within(key)
+/// The noise of lengths and of angles, then their resolutions, mm and rad.
+pub(super) fn noise(document: &document::Instrument) -> Result<[Option<f64>; 4], Fault> {
+    let internal = |stated: Option<NotNegative>, unit: Unit, key: &str| {
+        let checked = |NotNegative(number)| limits::too_small_um(number).map_or(Ok(unit.to_internal(number)), Err);
+        stated.map(checked).transpose().within(key)
     };
-    let in_rad = |arcsec: Option<NotNegative>, key: &str| {
-        let rad =
-            arcsec.map(|NotNegative(arcsec)| limits::too_small_um(arcsec).map_or(Ok(arcsec * RAD_PER_ARCSEC), Err));
-        rad.transpose().within(key)
-    };
-    Ok(Instrument {
-        kind,
-        noise_mm: in_mm(document.noise_um, "noise_um")?,
-        noise_rad: in_rad(document.noise_arcsec, "noise_arcsec")?,
-        resolution_mm: in_mm(document.resolution_um, "resolution_um")?.filter(|step| *step > 0.0),
-        resolution_rad: in_rad(document.resolution_arcsec, "resolution_arcsec")?.filter(|step| *step > 0.0),
-    })
+    let is_stepped = |step: &f64| *step > 0.0;
+    Ok([
+        internal(document.noise_um, Unit::Micrometre, "noise_um")?,
+        internal(document.noise_arcsec, Unit::Arcsecond, "noise_arcsec")?,
+        internal(document.resolution_um, Unit::Micrometre, "resolution_um")?.filter(is_stepped),
+        internal(document.resolution_arcsec, Unit::Arcsecond, "resolution_arcsec")?.filter(is_stepped),
+    ])
 }
 
 /// The errors to be estimated: those stated, or the defaults of the instrument.

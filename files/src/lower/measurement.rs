@@ -7,6 +7,7 @@ use abbe_model::axis::AxisKind;
 use abbe_model::document::fault::{Fault, Within};
 use abbe_model::document::measurement as document;
 use abbe_model::document::node::{Named, Node};
+use abbe_model::document::print;
 use abbe_model::document::schema;
 use abbe_model::document::value;
 use abbe_model::instrument::set_up::SetUp;
@@ -33,13 +34,13 @@ pub(super) fn tests(
     found: &mut Found,
 ) -> Result<Vec<Test>, Fault> {
     let name = &document.name;
-    let kind = document.kind.map_or(context.instrument, |kind| kind.0);
+    let kind = document.kind.unwrap_or(context.instrument);
     let SetUp { station: written, priors, socket, bar_setup } = set_up(kind, &document.set_up, context)?;
     let (station, geometry) = (written.map(|length| length.mm), written.map(|length| length.length.clone()));
     let HeldPositions { mut at, written: at_written, listed } = at(context, &document.at).within("at")?;
     let format = document.format.as_ref().map(|format| layout::format(format).within("format")).transpose()?;
     let columns = document.columns.as_ref().map(|columns| {
-        layout::columns(columns, |path| (context.place)(&["test"], Some(item), &[&["columns"], path].concat()))
+        layout::columns(columns, |path| (context.from.place)(&["test"], Some(item), &[&["columns"], path].concat()))
     });
     let motion = match (&document.sweep, &document.path) {
         (Some(_), Some(_)) => {
@@ -52,7 +53,7 @@ pub(super) fn tests(
         (None, None) => None,
     };
     let contributors = document.contributors.map(|of| contributors(of, &station).within("contributors")).transpose()?;
-    let is_measured = document.data.is_some() || matches!(context.data, Data::Columns([_, ..]));
+    let is_measured = document.data.is_some() || matches!(context.from.data, Data::Columns([_, ..]));
     if !is_measured && motion.is_none() {
         let help = "add `data = \"….csv\"`, or the motion of the axes: `sweep = { … }` or `path = { … }`";
         return Err(Fault::of_table("has neither data nor a motion", help));
@@ -77,7 +78,7 @@ pub(super) fn tests(
     if !is_measured {
         check::plan(context.machine, &test)?;
     }
-    if !is_measured || matches!(context.data, Data::None) {
+    if !is_measured || matches!(context.from.data, Data::None) {
         return Ok(vec![test]);
     }
 
@@ -85,13 +86,13 @@ pub(super) fn tests(
     let request = Request {
         machine: context.machine,
         test: &test,
-        store: &context.options.store,
+        store: &context.from.options.store,
         at_listed: &listed,
         format: format.unwrap_or_else(|| context.format.clone()),
         // An empty table maps no column: the file has the default names.
         columns: columns.map(Vec::as_slice).filter(|columns| !columns.is_empty()),
     };
-    let Filling { by_socket, quantities, warnings } = match context.data {
+    let Filling { by_socket, quantities, warnings } = match context.from.data {
         Data::Columns(columns) => memory::read(columns, &request)?,
         _ => {
             let named = document.data.as_deref().unwrap_or_default();
@@ -188,26 +189,11 @@ fn contributors(document: Contributors, station: &Station<f64>) -> Result<Contri
         return Err(Fault::new(message, help).on_key());
     }
     let is_angle = station.channels().first().is_some_and(|channel| channel.is_angle());
-    let of_lengths = [
-        ("device_u_um", document.device_u_um),
-        ("device_u_um_m", document.device_u_um_m),
-        ("misalignment_mm", document.misalignment_mm),
-        ("expansion_um_m_k", document.expansion_um_m_k),
-        ("expansion_u_um_m_k", document.expansion_u_um_m_k),
-        ("temperature_difference_k", document.temperature_difference_k),
-        ("temperature_u_k", document.temperature_u_k),
-        ("environment_um", document.environment_um),
-        ("setup_u_um", document.setup_u_um),
-    ];
-    let of_angles = [
-        ("device_u_arcsec", document.device_u_arcsec),
-        ("environment_arcsec", document.environment_arcsec),
-        ("setup_u_arcsec", document.setup_u_arcsec),
-    ];
-    let (wrong, of): (&[_], _) = if is_angle { (&of_lengths, "lengths") } else { (&of_angles, "angles") };
-    match wrong.iter().find(|(_, value)| value.is_some()) {
-        Some((key, _)) => {
-            let reads = if is_angle { "angles" } else { "lengths" };
+    let stated = print::json_of(&document)?;
+    let mut keys = stated.as_object().into_iter().flatten().map(|(key, _)| key);
+    match keys.find(|key| key.ends_with("_arcsec") != is_angle) {
+        Some(key) => {
+            let [of, reads] = if is_angle { ["lengths", "angles"] } else { ["angles", "lengths"] };
             Err(Fault::of_key(format!("is of {of}; the figures of this test are of {reads}"), None).on_key().at(key))
         }
         None => Ok(document),
@@ -216,10 +202,10 @@ fn contributors(document: Contributors, station: &Station<f64>) -> Result<Contri
 
 /// The data file: in the data directory if one is given, else beside the session file.
 fn data_file(context: &Context<'_>, named: &str) -> Result<PathBuf, Fault> {
-    let beside = context.file.parent().unwrap_or(Path::new("")).join(named);
-    let elsewhere = context.options.data_directory.as_ref().map(|folder| folder.join(named));
-    if let Some(found) = elsewhere.iter().chain([&beside]).find(|file| context.options.store.exists(file)) {
-        access::check(context.file, context.options, ("data", named), found)?;
+    let beside = context.from.file.parent().unwrap_or(Path::new("")).join(named);
+    let elsewhere = context.from.options.data_directory.as_ref().map(|folder| folder.join(named));
+    if let Some(found) = elsewhere.iter().chain([&beside]).find(|file| context.from.options.store.exists(file)) {
+        access::check(context.from.file, context.from.options, ("data", named), found)?;
         return Ok(found.clone());
     }
     let (looked, help) = match &elsewhere {

@@ -16,8 +16,7 @@ use abbe_model::chain::Machine;
 use abbe_model::diagnostic::Location;
 use abbe_model::document::effect as effect_document;
 use abbe_model::document::fault::{Fault, Within};
-use abbe_model::document::node::Node;
-use abbe_model::document::session as document;
+use abbe_model::document::session::{self as document, Parts};
 use abbe_model::driver::column;
 use abbe_model::effect::Effect;
 use abbe_model::instrument::{InstrumentKind, InstrumentParameter, kinds};
@@ -55,21 +54,15 @@ pub(crate) struct Surroundings<'a> {
     pub place: &'a (dyn Fn(&[&str], Option<usize>, &[&str]) -> Location + Sync),
 }
 
-/// Context of the session for tests and effects.
+/// Context of the session for tests.
 struct Context<'a> {
-    /// The session file.
-    file: &'a Path,
+    from: &'a Surroundings<'a>,
     machine: &'a Machine,
     /// The instrument of tests that name no other.
     instrument: InstrumentKind,
-    /// The parameters of the instruments of the tests that are read.
-    of_instruments: Vec<InstrumentParameter>,
     constants: &'a [Constant],
     format: Format,
     columns: Option<Vec<ColumnMapping>>,
-    data: Data<'a>,
-    options: &'a ReadOptions,
-    place: &'a (dyn Fn(&[&str], Option<usize>, &[&str]) -> Location + Sync),
 }
 
 /// What was found while the tests were read, beside the tests.
@@ -94,8 +87,9 @@ pub(crate) fn head(
     comment: &dyn Fn(&[&str]) -> Option<String>,
 ) -> Result<Session, Fault> {
     let constants = head::constants(&document.constants, |name| comment(&["constants", name])).within("constants")?;
-    let instrument = head::instrument(&document.instrument).within("instrument")?;
-    let head::Instrument { kind, noise_mm, noise_rad, resolution_mm, resolution_rad } = instrument;
+    let kind = document.instrument.kind;
+    let [noise_mm, noise_rad, resolution_mm, resolution_rad] =
+        head::noise(&document.instrument).within("instrument")?;
     let about = head::about(&document.about).within("about")?;
     let unknowns = head::unknowns(&machine, kind, &document.unknowns).within("errors").within("unknowns")?;
     Ok(Session {
@@ -110,59 +104,30 @@ pub(crate) fn head(
     })
 }
 
-/// What a document says beside its head.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct Parts<'d> {
-    pub format: Option<&'d abbe_model::document::layout::Format>,
-    pub columns: Option<&'d abbe_model::document::layout::Columns>,
-    pub test: &'d [abbe_model::document::measurement::Test],
-    pub effect: &'d [effect_document::Effect],
-    pub socket_distance: &'d [Node],
-    pub tolerance: Option<&'d abbe_model::document::tolerance::Tolerance>,
-    pub clearance: Option<&'d document::Clearance>,
-}
-
-impl<'d> From<&'d document::Session> for Parts<'d> {
-    fn from(document: &'d document::Session) -> Parts<'d> {
-        Parts {
-            format: document.format.as_ref(),
-            columns: document.columns.as_ref(),
-            test: &document.test,
-            effect: &document.effect,
-            socket_distance: &document.socket_distance,
-            tolerance: document.tolerance.as_ref(),
-            clearance: document.clearance.as_ref(),
-        }
-    }
-}
-
 /// Adds tests, effects, distances of sockets, limits, sizes. After an error the session is unchanged.
-pub(crate) fn add(session: &mut Session, document: Parts<'_>, surroundings: &Surroundings<'_>) -> Result<Found, Fault> {
+pub(crate) fn add(session: &mut Session, parts: &Parts, surroundings: &Surroundings<'_>) -> Result<Found, Fault> {
     let mut found = Found::default();
-    let format = document.format.map(|format| layout::format(format).within("format")).transpose()?;
+    let format = parts.format.as_ref().map(|format| layout::format(format).within("format")).transpose()?;
+    let columns = parts.columns.as_ref();
     let columns =
-        document.columns.map(|columns| layout::columns(columns, |path| (surroundings.place)(&["columns"], None, path)));
-    let mut context = Context {
-        file: surroundings.file,
+        columns.map(|columns| layout::columns(columns, |path| (surroundings.place)(&["columns"], None, path)));
+    let context = Context {
+        from: surroundings,
         machine: &session.machine,
         instrument: session.instrument,
-        of_instruments: Vec::new(),
         constants: &session.constants,
         format: format.unwrap_or_default(),
         columns,
-        data: surroundings.data,
-        options: surroundings.options,
-        place: surroundings.place,
     };
     let mut declared = declared(session);
     let mut tests = session.tests.clone();
     // Their data files are read side by side. Errors and warnings are in the order of the tests.
-    let read = document.test.par_iter().enumerate().map(|(item, document)| {
+    let read = parts.test.par_iter().enumerate().map(|(item, document)| {
         let mut found = Found::default();
         measurement::tests(&context, item, document, &mut found).map(|parts| (parts, found))
     });
     let read: Vec<Result<_, Fault>> = read.collect();
-    for ((item, document), read) in document.test.iter().enumerate().zip(read) {
+    for ((item, document), read) in parts.test.iter().enumerate().zip(read) {
         let others = declared.iter().map(|test| test.name.as_str());
         check::name(&document.name, others).within("name").within_item(item).within("test")?;
         let (parts, of_test) = read.within_item(item).within("test")?;
@@ -178,26 +143,32 @@ pub(crate) fn add(session: &mut Session, document: Parts<'_>, surroundings: &Sur
             tests.push(test);
         }
     }
-    context.of_instruments = session::instrument_parameters(session.instrument, &tests);
-    let columns = driver_columns(&context, &tests);
-    let effects = document.effect.iter().enumerate();
-    let effects = effects.map(|(item, effect)| effect::effect(&context, &declared, &columns, effect).within_item(item));
+    let of_effects = effect::Context {
+        machine: &session.machine,
+        instrument: session.instrument,
+        of_instruments: &session::instrument_parameters(session.instrument, &tests),
+        declared: &declared,
+        columns: driver_columns(&context, &tests),
+    };
+    let effects = parts.effect.iter().enumerate();
+    let effects = effects.map(|(item, effect)| effect::effect(&of_effects, effect).within_item(item));
     let effects = effects.collect::<Result<Vec<_>, _>>().within("effect")?;
     let read = !matches!(surroundings.data, Data::None);
-    let distances = head::socket_distances(session.instrument, &tests, document.socket_distance, read);
+    let distances = head::socket_distances(session.instrument, &tests, &parts.socket_distance, read);
     let distances = distances.within("socket_distance")?;
     let names: Vec<&str> = tests.iter().map(|test| test.name.as_str()).collect();
-    let tolerance = document
+    let tolerance = parts
         .tolerance
+        .as_ref()
         .map(|limits| tolerance::tolerance(&session.machine, &session.unknowns, &names, limits).within("tolerance"));
     let tolerance = tolerance.transpose()?;
     session.tests = tests;
     session.effects.extend(effects);
     session.socket_distances.extend(distances);
-    session.clearance = document.clearance.map(body::clearance).or(session.clearance);
+    session.clearance = parts.clearance.or(session.clearance);
     session.tolerance = tolerance.or(session.tolerance.take());
     session.warnings.extend(found.warnings.iter().cloned());
-    if !document.test.is_empty() {
+    if !parts.test.is_empty() {
         session.warnings.extend(check::noise_of_no_channel(session));
     }
     session.lever_mm = session.stated_lever_mm().unwrap_or(session.lever_mm);
@@ -211,22 +182,12 @@ pub(crate) fn effect_of(
     tests: &[String],
     document: &effect_document::Effect,
 ) -> Result<Effect, Fault> {
-    let context = Context {
-        file: Path::new(""),
-        machine,
-        // No test is read with it.
-        instrument: kinds()[0],
-        of_instruments: of_instruments.to_vec(),
-        constants: &[],
-        format: Format::default(),
-        columns: None,
-        data: Data::None,
-        options: &ReadOptions::default(),
-        place: &|_, _, _| Location::default(),
-    };
     let declared: Vec<Declared> =
         tests.iter().map(|name| Declared { name: name.clone(), parts: vec![name.clone()] }).collect();
-    effect::effect(&context, &declared, &BTreeSet::new(), document)
+    // Messages name it for a component that is not among the parameters.
+    let instrument = kinds()[0];
+    let columns = BTreeSet::new();
+    effect::effect(&effect::Context { machine, instrument, of_instruments, declared: &declared, columns }, document)
 }
 
 /// The driver columns of the data, and those that `[columns]` names.

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 
 use abbe_model::chain::Machine;
 use abbe_model::document::value::{Json, Long, Positive};
-use abbe_model::document::{effect, kind, machine, print};
+use abbe_model::document::{effect, machine, print};
 use abbe_model::driver::column::TEMPERATURE;
 use abbe_model::driver::{self, Driver};
 use abbe_model::effect::Effect;
+use abbe_model::instrument::InstrumentKind;
 use abbe_model::parameter_id::ParameterId;
 use abbe_model::session::Prior;
 use abbe_model::unit::{Unit, reading};
@@ -53,7 +54,7 @@ pub struct Model<M, E, C> {
     #[serde(serialize_with = "sorted")]
     pub machine: M,
     /// The instrument of the readings: `ballbar`, `tracker`, …
-    pub instrument: kind::Kind,
+    pub instrument: InstrumentKind,
     /// The effects, with the keys of `[[effect]]`.
     #[serde(serialize_with = "sorted", deserialize_with = "long")]
     #[schemars(with = "Long<Vec<E>>")]

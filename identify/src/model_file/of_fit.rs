@@ -1,7 +1,6 @@
 //! The model of a fit.
 
 use abbe_model::Diagnostic;
-use abbe_model::document::kind::Kind;
 use abbe_model::document::value::Positive;
 use abbe_model::driver::Reference;
 use abbe_model::session::{Prior, Session};
@@ -54,7 +53,7 @@ impl IdentifiedModel {
             schema_version: SCHEMA_VERSION,
             sha256: String::new(),
             machine: problem.session.machine.as_ref().clone(),
-            instrument: Kind(problem.session.instrument),
+            instrument: problem.session.instrument,
             effects: problem.parameters.effects.clone(),
             parameters: parameters.collect(),
             covariance: base.covariance,

@@ -1,14 +1,11 @@
 //! `[format]` and `[columns]`: the layout of data files.
 
-use std::fmt;
-
 use schemars::JsonSchema;
-use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
-use serde::de::{self, MapAccess, SeqAccess, Visitor};
+use serde::de::{self, IgnoredAny};
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::node::{Named, Node};
-use super::value::Count;
+use super::value::{Count, Form, unexpected};
 
 /// Layout of the data files.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -87,56 +84,40 @@ pub struct Several(pub Vec<ForeignColumn>);
 
 impl<'de> Deserialize<'de> for Several {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Of;
-        impl<'de> Visitor<'de> for Of {
-            type Value = Several;
-
-            fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-                formatter.write_str("the name of a column in quotes, its number from 1, or a list of them")
-            }
-
-            fn visit_f64<E: de::Error>(self, number: f64) -> Result<Several, E> {
-                Count::try_from(number).map(|number| Several(vec![ForeignColumn::Number(number)])).map_err(E::custom)
-            }
-
-            fn visit_str<E>(self, name: &str) -> Result<Several, E> {
-                Ok(Several(vec![ForeignColumn::Name(name.trim().to_string())]))
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, items: A) -> Result<Several, A::Error> {
-                Vec::deserialize(SeqAccessDeserializer::new(items)).map(Several)
-            }
+        let expected = "the name of a column in quotes, its number from 1, or a list of them";
+        match Form::<ForeignColumn>::of(deserializer, expected)? {
+            Form::Number(number) => number_of_column(number).map(|column| Several(vec![column])),
+            Form::Text(name) => Ok(Several(vec![ForeignColumn::Name(name.trim().to_string())])),
+            Form::List(columns) => Ok(Several(columns)),
+            Form::Table(_) => Err(unexpected(expected)),
         }
-        deserializer.deserialize_any(Of)
     }
+}
+
+fn number_of_column<E: de::Error>(number: f64) -> Result<ForeignColumn, E> {
+    Count::try_from(number).map(ForeignColumn::Number).map_err(E::custom)
 }
 
 impl<'de> Deserialize<'de> for ForeignColumn {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct OfColumn;
-        impl<'de> Visitor<'de> for OfColumn {
-            type Value = ForeignColumn;
-
-            fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-                formatter.write_str("the name of a column in quotes, or its number from 1,")
-            }
-
-            fn visit_newtype_struct<D: Deserializer<'de>>(self, column: D) -> Result<ForeignColumn, D::Error> {
-                column.deserialize_any(self)
-            }
-
-            fn visit_f64<E: de::Error>(self, number: f64) -> Result<ForeignColumn, E> {
-                Count::try_from(number).map(ForeignColumn::Number).map_err(E::custom)
-            }
-
-            fn visit_str<E>(self, name: &str) -> Result<ForeignColumn, E> {
-                Ok(ForeignColumn::Name(name.trim().to_string()))
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, keys: A) -> Result<ForeignColumn, A::Error> {
-                Traversals::deserialize(MapAccessDeserializer::new(keys)).map(ForeignColumn::Traversals)
+        /// A name may have several lines.
+        struct Lines(Form<IgnoredAny, Traversals>);
+        const EXPECTED: &str = "the name of a column in quotes, or its number from 1,";
+        impl<'de> Deserialize<'de> for Lines {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                Form::of(deserializer, EXPECTED).map(Lines)
             }
         }
-        deserializer.deserialize_newtype_struct(super::de::LINES, OfColumn)
+        /// The type by whose name the deserialiser knows such a text.
+        #[derive(Deserialize)]
+        #[serde(rename = "Lines")]
+        struct OfLines(Lines);
+        let OfLines(Lines(column)) = OfLines::deserialize(deserializer)?;
+        match column {
+            Form::Number(number) => number_of_column(number),
+            Form::Text(name) => Ok(ForeignColumn::Name(name.trim().to_string())),
+            Form::Table(traversals) => Ok(ForeignColumn::Traversals(traversals)),
+            Form::List(_) => Err(unexpected(EXPECTED)),
+        }
     }
 }

@@ -3,11 +3,11 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::kind::Kind;
 use super::layout::{Columns, Format};
 use super::movement::{Path, Sweep};
 use super::node::{Named, Node};
 use super::value::Length;
+use crate::instrument::InstrumentKind;
 use crate::session::contributors::Contributors;
 
 /// A test.
@@ -18,7 +18,7 @@ pub struct Test {
     /// A name that no other test has.
     pub name: String,
     /// The instrument of this test, if it is another than the session's.
-    pub kind: Option<Kind>,
+    pub kind: Option<InstrumentKind>,
     /// The data file, relative to the session file or to the data folder.
     pub data: Option<String>,
     /// The keys of the set-up, which depend on the instrument.

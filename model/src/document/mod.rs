@@ -12,7 +12,7 @@ mod de;
 pub mod edit;
 pub mod effect;
 pub mod fault;
-pub mod kind;
+mod kind;
 pub mod layout;
 pub mod machine;
 pub mod measurement;

@@ -1,7 +1,6 @@
 //! From the domain to documents, which read back to the same bits.
 
 use super::effect::{self, SCALES};
-use super::kind::Kind;
 use super::machine::{Axis, Machine};
 use super::measurement::Test;
 use super::movement::{Circle, Follow, Line, Path, Sweep};
@@ -110,7 +109,7 @@ pub fn test(test: &DomainTest, machine: &chain::Machine, instrument: InstrumentK
     Some(Test {
         name: test.name.clone(),
         set_up,
-        kind: (kind != instrument).then_some(Kind(kind)),
+        kind: (kind != instrument).then_some(kind),
         setup: stated(&test.setup, &test.name),
         spindle_setup: stated(&test.spindle_setup, kind.spindle_setup(&test.name)),
         at: Named(held.collect()),

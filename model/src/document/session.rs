@@ -4,18 +4,20 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, Serializer};
 
 use super::effect::Effect;
-use super::kind::Kind;
 use super::layout::{Columns, Format};
 use super::machine::Machine;
 use super::measurement::Test;
 use super::node::{Entries, Named, Node};
 use super::tolerance::Tolerance;
 use super::value::{NotNegative, Note, Positive};
+use crate::body::ClearanceSizes;
+use crate::instrument::InstrumentKind;
 
 /// session.toml: a machine, a plan of tests, and the readings of the tests that were run. The name of a number contains
 /// its unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename = "session", deny_unknown_fields)]
+#[serde(rename = "session")]
+#[schemars(deny_unknown_fields)]
 pub struct Session {
     /// The machine file, or the tables of the machine: [machine] with `file = "machine.toml"`, or the machine's tables in
     /// it.
@@ -40,6 +42,17 @@ pub struct Session {
     /// The errors to estimate.
     #[serde(default, skip_serializing_if = "Unknowns::is_default")]
     pub unknowns: Unknowns,
+    /// The other tables.
+    #[serde(rename = "$rest", default)]
+    #[schemars(flatten)]
+    pub parts: Parts,
+}
+
+/// What a session states beside its machine, its instrument and the errors to estimate. A program adds it part by part.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(inline)]
+pub struct Parts {
     /// Layout of the data files.
     pub format: Option<Format>,
     /// Own name = foreign name or number; the own name contains the unit.
@@ -58,7 +71,7 @@ pub struct Session {
     /// Limits for decisions of conformity by the rule of ISO 14253-1.
     pub tolerance: Option<Tolerance>,
     /// Sizes of the ball bar for checks of clearance against the bodies of the machine.
-    pub clearance: Option<Clearance>,
+    pub clearance: Option<ClearanceSizes>,
 }
 
 /// The machine of a session.
@@ -114,7 +127,7 @@ enum ConstantForms {
 #[serde(rename = "instrument", deny_unknown_fields)]
 pub struct Instrument {
     /// The kind of the instrument.
-    pub kind: Kind,
+    pub kind: InstrumentKind,
     /// Noise standard deviation of one length, µm; estimated if absent.
     pub noise_um: Option<NotNegative>,
     /// Noise standard deviation of one angle, arcsec; estimated if absent.
@@ -123,6 +136,13 @@ pub struct Instrument {
     pub resolution_um: Option<NotNegative>,
     /// Resolution of an angle, arcsec.
     pub resolution_arcsec: Option<NotNegative>,
+}
+
+impl Instrument {
+    /// An instrument whose noise is to be estimated.
+    pub fn new(kind: InstrumentKind) -> Instrument {
+        Instrument { kind, noise_um: None, noise_arcsec: None, resolution_um: None, resolution_arcsec: None }
+    }
 }
 
 /// The errors to estimate.
@@ -153,28 +173,4 @@ pub struct SocketDistance {
     pub mm: Positive,
     /// Its standard uncertainty; absent: exact.
     pub u_um: Option<NotNegative>,
-}
-
-/// Sizes of the ball bar for checks of clearance.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename = "clearance", deny_unknown_fields)]
-pub struct Clearance {
-    /// Radius of the bar; default 10.
-    pub bar_radius_mm: Option<Positive>,
-    /// The stem below the workpiece ball, along -Z of the table frame.
-    pub workpiece_holder: Option<Holder>,
-    /// The stem above the spindle ball, along Z of the tool frame.
-    pub spindle_holder: Option<Holder>,
-    /// Least clearance of a proposed test; less causes a warning. Default 5.
-    pub least_mm: Option<NotNegative>,
-}
-
-/// A stem that holds a ball.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename = "holder", deny_unknown_fields)]
-pub struct Holder {
-    /// Radius of the stem.
-    pub radius_mm: Positive,
-    /// Its length from the centre of the ball.
-    pub length_mm: Positive,
 }

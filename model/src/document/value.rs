@@ -6,13 +6,57 @@ use std::fmt;
 use std::marker::PhantomData;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::de::{SeqAccess, Visitor, value};
+use serde::de::{self, IgnoredAny, MapAccess, SeqAccess, Visitor, value};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::fault::Fault;
 use crate::session::expression::{self, Constant};
 use crate::session::limits;
 use crate::words;
+
+/// A value that may have several forms, in the one that it has.
+pub(super) enum Form<T, M = IgnoredAny> {
+    Number(f64),
+    Text(String),
+    List(Vec<T>),
+    Table(M),
+}
+
+impl<'de, T: Deserialize<'de>, M: Deserialize<'de>> Form<T, M> {
+    /// The form of a value. Messages about any other say that one of the `expected` forms is expected.
+    pub(super) fn of<D: Deserializer<'de>>(deserializer: D, expected: &str) -> Result<Form<T, M>, D::Error> {
+        struct Any<'e, T, M>(&'e str, PhantomData<(T, M)>);
+        impl<'de, T: Deserialize<'de>, M: Deserialize<'de>> Visitor<'de> for Any<'_, T, M> {
+            type Value = Form<T, M>;
+
+            fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+                formatter.write_str(self.0)
+            }
+
+            fn visit_f64<E>(self, number: f64) -> Result<Form<T, M>, E> {
+                Ok(Form::Number(number))
+            }
+
+            fn visit_str<E>(self, text: &str) -> Result<Form<T, M>, E> {
+                Ok(Form::Text(text.to_string()))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, items: A) -> Result<Form<T, M>, A::Error> {
+                Vec::deserialize(value::SeqAccessDeserializer::new(items)).map(Form::List)
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, keys: A) -> Result<Form<T, M>, A::Error> {
+                M::deserialize(value::MapAccessDeserializer::new(keys)).map(Form::Table)
+            }
+        }
+        deserializer.deserialize_any(Any(expected, PhantomData))
+    }
+}
+
+/// The fault of another form than those that are expected.
+pub(super) fn unexpected<E: de::Error>(expected: &str) -> E {
+    E::invalid_type(de::Unexpected::Other("another form"), &expected)
+}
 
 /// mm: a number, or an expression in `[constants]` in quotes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -63,23 +107,12 @@ impl Length {
 
 impl<'de> Deserialize<'de> for Length {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct OfLength;
-        impl Visitor<'_> for OfLength {
-            type Value = Length;
-
-            fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-                formatter.write_str("a number or an expression in quotes")
-            }
-
-            fn visit_f64<E: serde::de::Error>(self, number: f64) -> Result<Length, E> {
-                Ok(Length::Number(number))
-            }
-
-            fn visit_str<E>(self, text: &str) -> Result<Length, E> {
-                Ok(Length::Expression(text.to_string()))
-            }
+        let expected = "a number or an expression in quotes";
+        match Form::<IgnoredAny>::of(deserializer, expected)? {
+            Form::Number(number) => Ok(Length::Number(number)),
+            Form::Text(text) => Ok(Length::Expression(text)),
+            _ => Err(unexpected(expected)),
         }
-        deserializer.deserialize_any(OfLength)
     }
 }
 
@@ -238,39 +271,29 @@ enum OneOrMoreDirections {
 impl<'de> Deserialize<'de> for Directions {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         /// A number of one direction, or a direction of a list.
-        struct Item(Option<f64>, Option<Direction>);
+        struct Item(Form<f64>);
         impl<'de> Deserialize<'de> for Item {
             fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-                struct Of;
-                impl<'de> Visitor<'de> for Of {
-                    type Value = Item;
-
-                    fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-                        formatter.write_str("a number or a direction")
-                    }
-
-                    fn visit_f64<E: serde::de::Error>(self, number: f64) -> Result<Item, E> {
-                        Ok(Item(Some(number), None))
-                    }
-
-                    fn visit_seq<A: SeqAccess<'de>>(self, items: A) -> Result<Item, A::Error> {
-                        let direction = Direction::deserialize(value::SeqAccessDeserializer::new(items))?;
-                        Ok(Item(None, Some(direction)))
-                    }
-                }
-                deserializer.deserialize_any(Of)
+                Form::of(deserializer, "a number or a direction").map(Item)
             }
         }
-        let items: Vec<Item> = Vec::deserialize(deserializer)?;
-        let numbers: Vec<f64> = items.iter().filter_map(|item| item.0).collect();
-        let directions: Vec<[f64; 3]> = items.iter().filter_map(|item| Some(item.1?.0)).collect();
-        let fault = || serde::de::Error::custom("neither a direction, such as [0, 0, 1], nor a list of directions");
-        if !directions.is_empty() && numbers.is_empty() {
-            return Ok(Directions(directions));
+        let (mut numbers, mut vectors) = (Vec::new(), Vec::new());
+        for Item(item) in Vec::deserialize(deserializer)? {
+            match item {
+                Form::Number(number) => numbers.push(number),
+                Form::List(vector) => vectors.push(vector),
+                _ => return Err(unexpected("a number or a direction")),
+            }
         }
-        let vector: [f64; 3] = numbers.try_into().map_err(|_| fault())?;
-        let one = Direction::try_from(Three(vector)).map_err(serde::de::Error::custom)?;
-        if directions.is_empty() { Ok(Directions(vec![one.0])) } else { Err(fault()) }
+        if numbers.is_empty() != vectors.is_empty() {
+            vectors.extend(Some(numbers).filter(|numbers| !numbers.is_empty()));
+            let directions = vectors.into_iter().map(|vector| {
+                let vector = vector.try_into().map_err(|_| unexpected(f64::THREE))?;
+                Direction::try_from(Three(vector)).map(|direction| direction.0).map_err(de::Error::custom)
+            });
+            return directions.collect::<Result<_, D::Error>>().map(Directions);
+        }
+        Err(de::Error::custom("neither a direction, such as [0, 0, 1], nor a list of directions"))
     }
 }
 
@@ -327,25 +350,14 @@ enum OneOrThree {
 
 impl<'de> Deserialize<'de> for Uncertainties {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct OneOrThree;
-        impl<'de> Visitor<'de> for OneOrThree {
-            type Value = Uncertainties;
-
-            fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-                formatter.write_str("a number or a list of three")
+        let expected = "a number or a list of three";
+        match Form::of(deserializer, expected)? {
+            Form::Number(u) => {
+                Uncertainty::try_from(Unlimited(u)).map(|u| Uncertainties([u; 3])).map_err(de::Error::custom)
             }
-
-            fn visit_f64<E: serde::de::Error>(self, u: f64) -> Result<Uncertainties, E> {
-                Uncertainty::try_from(Unlimited(u)).map(|u| Uncertainties([u; 3])).map_err(E::custom)
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, items: A) -> Result<Uncertainties, A::Error> {
-                let u: Vec<Uncertainty> = Deserialize::deserialize(value::SeqAccessDeserializer::new(items))?;
-                let count = u.len();
-                u.try_into().map(Uncertainties).map_err(|_| serde::de::Error::invalid_length(count, &self))
-            }
+            Form::List(u) => Vec::try_into(u).map(Uncertainties).map_err(|_| unexpected(expected)),
+            Form::Text(_) | Form::Table(IgnoredAny) => Err(unexpected(expected)),
         }
-        deserializer.deserialize_any(OneOrThree)
     }
 }
 
@@ -361,20 +373,12 @@ pub struct Json(pub serde_json::Value);
 
 impl<'de> Deserialize<'de> for Json {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct OfText;
-        impl<'de> Visitor<'de> for OfText {
-            type Value = Json;
-
-            fn expecting(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-                formatter.write_str("any value")
-            }
-
-            fn visit_newtype_struct<D: Deserializer<'de>>(self, text: D) -> Result<Json, D::Error> {
-                let text = String::deserialize(text)?;
-                serde_json::from_str(&text).map(Json).map_err(serde::de::Error::custom)
-            }
-        }
-        deserializer.deserialize_newtype_struct(super::de::JSON, OfText)
+        /// The type by whose name the deserialiser knows such a text.
+        #[derive(Deserialize)]
+        #[serde(rename = "Json")]
+        struct Text(String);
+        let Text(text) = Text::deserialize(deserializer)?;
+        serde_json::from_str(&text).map(Json).map_err(de::Error::custom)
     }
 }
 

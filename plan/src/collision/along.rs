@@ -68,7 +68,7 @@ impl Parts<'_> {
 
     /// Whether a state has the least clearance that is asked for.
     pub fn clears(&self, at: &[f64]) -> bool {
-        self.below(at, self.sizes.least_mm, Mounted::Bar, Compared::All).is_none()
+        self.below(at, self.sizes.least_mm.0, Mounted::Bar, Compared::All).is_none()
     }
 
     /// Whether all states of a test have the least clearance that is asked for.

@@ -91,7 +91,7 @@ pub fn warnings_of_moves(session: &Session, moves: &[Moves]) -> Vec<String> {
 }
 
 fn warning(session: &Session, found: &TestClearance, stage: &str) -> Option<String> {
-    if found.clearance_mm >= session.clearance.unwrap_or_default().least_mm {
+    if found.clearance_mm >= session.clearance.unwrap_or_default().least_mm.0 {
         return None;
     }
     let at: Vec<String> = found.at.iter().map(|(name, q)| format!("{name} = {q:.3}")).collect();

@@ -103,6 +103,7 @@ impl<'m> Parts<'m> {
         if let Some(bar) = &bar {
             let stem = |name: &str, side: Side, ball: Target<f64>, up: f64, Holder { radius_mm, length_mm }: Holder| {
                 let from = ball.mm;
+                let (radius_mm, length_mm) = (radius_mm.0, length_mm.0);
                 let to = [from[0], from[1], from[2] + up * length_mm];
                 Part {
                     name: name.to_string(),
@@ -196,7 +197,7 @@ impl<'m> Parts<'m> {
 
     /// The clearance of the bar and a part, without what both have at the ball that they share.
     fn bar_clearance(&self, ends: [[f64; 3]; 2], part: &Part, (motion, placed): &(Pose, Placed), most: f64) -> f64 {
-        let radius = self.sizes.bar_radius_mm;
+        let radius = self.sizes.bar_radius_mm.0;
         let at = Pose::identity();
         let [workpiece, spindle] = ends;
         let Some(([_, end], stem)) = part.stem else {

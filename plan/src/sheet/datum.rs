@@ -145,7 +145,7 @@ fn tool(session: &Session, machine: &Machine, head: &[Axis]) -> Vec<String> {
         if let Some(holder) = session.clearance.and_then(|sizes| sizes.spindle_holder) {
             words.push(format!(
                 "The plan assumes {} mm from the nose to the centre of the {}.",
-                number(holder.length_mm),
+                number(holder.length_mm.0),
                 point.name
             ));
         }
