@@ -19,7 +19,7 @@ use abbe_model::session::Session;
 pub use abbe_trace::Progress;
 use abbe_trace::{SessionFit, TraceOutcome};
 pub use compare::{Compared, ComparisonOptions};
-pub use fit::FitOptions;
+pub use fit::{FitOptions, Terms};
 pub use plan::{Plan, PlanningOptions, problem_of};
 use schemars::JsonSchema;
 use serde::Serialize;

@@ -1,17 +1,16 @@
 //! `abbe fit`: estimate errors from readings.
 
-use abbe::analysis::FitOptions;
-use abbe::identify::{fit, plausibility, propagation};
+use abbe::analysis::{Analysis, FitOptions, Given};
+use abbe::identify::{fit, plausibility};
 use abbe::model::Diagnostic;
 use abbe::trace::SessionFit;
 use clap::Args;
 
-use super::forms::FormArguments;
 use super::method::{self, Method};
 use super::readings::ReadingArguments;
 use super::results::Read;
 use super::save::SaveArguments;
-use super::{CommonArguments, Global, SessionArguments, certificate, monte_carlo, read_session};
+use super::{CommonArguments, Global, SessionArguments, certificate, read_session};
 
 /// Examples of `abbe fit`.
 pub const HELP: &str = include_str!("help/fit.txt");
@@ -25,21 +24,17 @@ pub struct FitArguments {
     common: CommonArguments,
     #[command(flatten)]
     save: SaveArguments,
-    #[command(flatten)]
-    forms: FormArguments,
-    #[command(flatten)]
-    options: FitOptions,
     /// Method of identification.
     ///
     /// Example: --method two-plane
     #[arg(long, value_enum, default_value = "full")]
     method: Method,
     #[command(flatten)]
+    options: FitOptions,
+    #[command(flatten)]
     readings: ReadingArguments,
     #[command(flatten)]
     certificate: certificate::CertificateArguments,
-    #[command(flatten)]
-    draws: monte_carlo::DrawArguments,
 }
 
 /// Runs `abbe fit`.
@@ -50,7 +45,8 @@ pub fn run(arguments: &FitArguments, _: Global) -> Result<(), Diagnostic> {
     let outputs = common.output.prepared(&[views, residuals, save, dcc].map(Option::as_ref))?;
     let wanted = arguments.certificate.read(&arguments.session.session, &outputs)?;
     let (session, sources) = read_session(&arguments.session, &outputs)?;
-    let session = fit::assume(&session, &arguments.options.assume)?;
+    let options = &arguments.options;
+    let session = fit::assume(&session, &options.assume)?;
     let certificate = wanted.as_ref().map(|wanted| wanted.of(&session)).transpose()?;
     let mut read = Read::session(&session, &sources, common.seed);
     read.files.extend(wanted.as_ref().and_then(|wanted| wanted.stamp.as_ref()));
@@ -58,26 +54,25 @@ pub fn run(arguments: &FitArguments, _: Global) -> Result<(), Diagnostic> {
         method::refuse([
             ("--views", views.is_some()),
             ("--residuals", residuals.is_some()),
-            ("--base", arguments.forms.base),
-            ("--terms", arguments.forms.terms.is_some()),
+            ("--base", options.base),
+            ("--terms", options.terms.is_some()),
             ("--save", save.is_some()),
             ("--dcc", dcc.is_some()),
-            ("--allow-implausible", arguments.options.allow_implausible),
+            ("--allow-implausible", options.allow_implausible),
         ])?;
-        return arguments.method.run(&session, &arguments.draws, (common, &outputs), &read);
+        return arguments.method.run(&session, options, (common, &outputs), &read);
     }
-    let draws = arguments.draws.draws(common.seed)?;
-    let mut found = SessionFit::of(&session, common.seed)?;
-    let SessionFit { problem, fit, result } = &mut found;
-    arguments.readings.write(problem, fit)?;
-    if !arguments.options.allow_implausible {
-        plausibility::accepted(&result.plausibility)?;
+    // The tables of readings show why a session is refused.
+    let accepting = FitOptions { allow_implausible: true, assume: Vec::new(), ..options.clone() };
+    let found = SessionFit::run(&[Given::Session(&session)], &accepting, common.seed, &|_| true)?;
+    arguments.readings.write(&found.problem, &found.fit)?;
+    if !options.allow_implausible {
+        plausibility::accepted(&found.result.plausibility)?;
     }
-    if let Some(draws) = &draws {
-        propagation::add_monte_carlo(problem, fit, draws, result)?;
-    }
-    arguments.forms.add(problem, fit, result)?;
-    let commands = arguments.session.commands::<SessionFit>(common.seed, &arguments.options)?;
+    // A proposed command repeats what decides on estimates, not what is stated beside them.
+    let FitOptions { assume, allow_implausible, .. } = options.clone();
+    let repeated = FitOptions { assume, allow_implausible, ..FitOptions::default() };
+    let commands = arguments.session.commands::<SessionFit>(common.seed, &repeated)?;
     common.output.put_found(&outputs, &found, &commands, &read)?;
     if let (Some(wanted), Some(certificate)) = (&wanted, &certificate) {
         wanted.write(certificate, &found.problem, &found.result)?;

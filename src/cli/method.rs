@@ -1,5 +1,6 @@
 //! `abbe fit --method`: the methods of identification other than the full fit.
 
+use abbe::analysis::FitOptions;
 use abbe::apply::geometric;
 use abbe::identify::{fit, self_calibration};
 use abbe::model::Diagnostic;
@@ -8,7 +9,6 @@ use clap::ValueEnum;
 
 use super::CommonArguments;
 use super::failure::command_line;
-use super::monte_carlo::DrawArguments;
 use super::output::Outputs;
 use super::results::Read;
 use crate::report;
@@ -44,17 +44,21 @@ impl Method {
     pub fn run(
         self,
         session: &Session,
-        draws: &DrawArguments,
+        options: &FitOptions,
         (common, outputs): (&CommonArguments, &Outputs),
         read: &Read<'_>,
     ) -> Result<(), Diagnostic> {
         if let Some(method) = self.geometric() {
-            draws.refuse()?;
+            if options.monte_carlo.is_some() {
+                return Err(command_line(
+                    "`--monte-carlo` works with the full fit and with `--method self-calibration`: leave out `--method` or `--monte-carlo`",
+                ));
+            }
             let result = geometric::compare(session, method, common.seed)?;
             let (problem, _) = fit::prepare(session, common.seed)?;
             return common.output.put(outputs, &report::method::report(&problem, &result), &result, read);
         }
-        let draws = draws.draws(common.seed)?;
+        let draws = options.draws(common.seed)?;
         let result = self_calibration::calibrate(session)?.report(session, draws.as_ref());
         common.output.put(outputs, &report::self_calibration::report(session, &result), &result, read)
     }
