@@ -89,7 +89,8 @@ impl Contradicted {
         let mut warnings = plausibility::warnings(&self.plausibility);
         if !self.parameters.is_empty() {
             warnings.push(format!(
-                "the search uses no prior of {}, so that it accepts no effect that only represents a wrong set-up value",
+                "the search uses no prior of {}, so that it accepts no effect that only represents a wrong set-up value; \
+                 χ²/ν with the effects counts none of these priors, χ²/ν before counts them as `fit` does",
                 self.parameters.join(", ")
             ));
         }

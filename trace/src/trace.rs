@@ -181,6 +181,7 @@ fn without_conformity(
         let mut found = with_noise_of_repeats(problem_freed.clone(), fit_freed.clone(), options, progress)?;
         if found.result.interrupted || contradicted.contradicted_by(&problem, &fitted, &found.effects)? {
             contradicted.add_warnings(&mut found.result);
+            result::with_declared(&mut found, problem, fitted)?;
             return Ok(found);
         }
         // The effects found without the set-up priors explain the apparent contradiction. The search therefore runs

@@ -53,6 +53,12 @@ fn a_trace_names_a_ball_that_was_moved() {
         recipe.draw().write(folder.path()).unwrap();
         let (found, screen) = result_and_screen("trace", &folder.path().join("session.toml"), &["--all"]);
         let words = "the workpiece ball of P1 was moved before test C100, for C150 too";
+        // The model before is that of a fit, also where the search uses no prior that the readings contradict.
+        let (fitted, _) = result_and_screen("fit", &folder.path().join("session.toml"), &[]);
+        for key in ["chi_square", "degrees_of_freedom", "noise_um"] {
+            let [of_fit, before] = [&fitted[key], &found["before"][key]].map(|value| value.as_f64().unwrap());
+            assert!((before / of_fit - 1.0).abs() < 1e-6, "{key}: {of_fit} and {before}");
+        }
         if axial.is_some() {
             let mut suggestions = found["suggestions"].as_array().into_iter().flatten();
             let of_move = suggestions.find(|own| own["description"] == words);

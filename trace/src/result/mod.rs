@@ -20,6 +20,7 @@ use abbe_model::words::listed;
 use faer::prelude::Solve;
 use faer::{Mat, Side};
 
+use super::TraceOutcome;
 use super::alias::{Alias, CompetingEffect, Explanations};
 use super::judge::{fitted, with_noise_of_fit};
 use super::remainder::Structure;
@@ -164,6 +165,19 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Dia
     let result = build(declared, found, statements, effects);
     let (after, after_fit) = (after.clone(), after_fit.clone());
     Ok(ReportedEffect { after, after_fit, result, alias_effects, competing_effects })
+}
+
+/// States the fit of the session as the model before, in place of one without priors that the readings contradict.
+///
+/// # Errors
+/// If the model cannot be evaluated.
+pub(super) fn with_declared(found: &mut TraceOutcome, problem: Problem, fit: Fit) -> Result<(), Diagnostic> {
+    let by_last = Some(JudgedBy { readings: &found.after, heldout_mm: None });
+    let before = Model::of(&problem, &fit, false, by_last)?.figures;
+    found.result.changed_parameters = changed_parameters(&before.parameters, &found.result.after.parameters);
+    found.result.before = before;
+    (found.before, found.before_fit) = (problem, fit);
+    Ok(())
 }
 
 /// The families of the detectable candidates of a search.
