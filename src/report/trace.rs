@@ -81,8 +81,10 @@ pub fn report(
     report.key(before_and_after(result));
     conformity::section(&mut report, result.conformity.as_ref());
     confounded::section(&mut report, &result.after);
-    let presumed = "Location errors that rest on the absence of a motion, which no reading separates from them:";
-    report.headed(Level::Detail, presumed, Text::List(result.presumed.clone()));
+    for (level, presumed) in [Level::Key, Level::Detail].into_iter().zip(presumed(result)) {
+        let rest = "Location errors that rest on the absence of a motion, which no reading separates from them:";
+        report.headed(level, rest, Text::List(presumed));
+    }
     report.section("Next");
     report.headed(Level::Key, "Tests that separate an effect from its aliases:", Text::List(measure_next(result)));
     let page = "write residuals, plots and alternatives as a page";
@@ -103,6 +105,19 @@ pub fn report(
     session::correlations(&mut report, problem, &trace.after_fit);
     session::model(&mut report, problem, &trace.after_fit.beta)?;
     Ok(report)
+}
+
+/// What location errors presume: first of the axes that precess by an explanation of the readings, then of the others.
+fn presumed(result: &TraceResult) -> [Vec<String>; 2] {
+    let explanations = result.effects.iter().flat_map(|effect| {
+        let of_aliases = effect.aliases.iter().flat_map(|alias| std::iter::once(&alias.name).chain(&alias.variants));
+        std::iter::once(&effect.name).chain(&effect.variants).chain(of_aliases)
+    });
+    let precessing = explanations.filter(|name| name.shape == "precession");
+    let motions: Vec<String> = precessing.map(|name| format!(" {}~{}:", name.component, name.driver)).collect();
+    let is_of_one = |presumed: &String| motions.iter().any(|motion| presumed.contains(motion));
+    let (of_one, others) = result.presumed.iter().cloned().partition(is_of_one);
+    [of_one, others]
 }
 
 fn method(result: &TraceResult) -> String {

@@ -201,9 +201,15 @@ fn a_precession_is_an_explanation_of_a_machine_tool() {
                 .any(|name| name.component == "EAC" && name.shape == "precession")
         };
         assert!(result.effects.iter().any(explained), "{:#?}", result.effects);
-        // A tilt that turns twice per turn with the table is constant in the frame in which the readings show it.
+        // A tilt that turns twice per turn with the table is constant in the frame in which the readings show it. The screen
+        // says so of the table, which may precess, and of the other axis among the details.
         let presumed = "EA0C and EB0C presume that there is no EAC~C:precession1 or EAC~C:precession2";
         assert!(result.presumed.iter().any(|own| own == presumed), "{:#?}", result.presumed);
+        let folder = tempfile::tempdir().unwrap();
+        recipe.draw().write(folder.path()).unwrap();
+        let (_, screen) = result_and_screen("trace", &folder.path().join("session.toml"), &[]);
+        assert!(screen.contains(presumed), "{screen}");
+        assert!(screen.lines().filter(|line| line.contains(" presume ")).all(|line| line.contains("C~C:")), "{screen}");
     }
 }
 
