@@ -63,8 +63,10 @@ pub(super) fn search_and_refit(
     record: &mut SearchRecord<'_>,
     judge: impl Fn(&SearchState<'_>) -> Result<RefittedModel, Diagnostic>,
 ) -> Result<(f64, RefittedModel), Diagnostic> {
+    // A search that begins anew has not tuned anything yet.
+    let mut start = search.clone();
     let (mut ended, mut judged) = search_to_curves(search, record, &judge)?;
-    if let Some(smooth) = with_smooth_shapes(search, record, &judge)? {
+    if let Some(smooth) = with_smooth_shapes(search, &mut start, record, &judge)? {
         (ended, judged) = smooth;
     }
     // An effect whose number has no value in these readings is no effect of its own.
@@ -74,7 +76,8 @@ pub(super) fn search_and_refit(
         if beyond.is_empty() {
             break;
         }
-        search.restart_without(&beyond);
+        start.forbid(&beyond);
+        search.clone_from(&start);
         record.steps.clear();
         (ended, judged) = search_to_curves(search, record, &judge)?;
     }
@@ -110,23 +113,27 @@ fn search_to_curves(
 
 /// Searches once more without the staircases that were found: with enough steps they approximate any shape. A staircase stays
 /// if the objective of the whole model is higher than without it. Otherwise the model of the other shapes takes its place, and is
-/// returned.
-fn with_smooth_shapes(
-    search: &mut SearchState<'_>,
+/// returned. `start` is the state before the first round.
+fn with_smooth_shapes<'s>(
+    search: &mut SearchState<'s>,
+    start: &mut SearchState<'s>,
     record: &mut SearchRecord<'_>,
     judge: &impl Fn(&SearchState<'_>) -> Result<RefittedModel, Diagnostic>,
 ) -> Result<Option<(f64, RefittedModel)>, Diagnostic> {
     if !search.has_staircase() {
         return Ok(None);
     }
-    let (found, steps, strongest) = (search.clone(), std::mem::take(&mut record.steps), record.strongest.clone());
-    search.restart_without(&search.staircases());
+    let mut smooth = start.clone();
+    smooth.forbid(&start.staircases());
+    let found = std::mem::replace(search, smooth.clone());
+    let (steps, strongest) = (std::mem::take(&mut record.steps), record.strongest.clone());
     // An interruption keeps what was found.
     let ended = search_on(search, record);
     if ended.is_err() || found.objective_of_selected()? > search.objective_of_selected()? {
         (*search, record.steps, record.strongest) = (found, steps, strongest);
         return ended.map(|_| None);
     }
+    *start = smooth;
     search_to_curves(search, record, judge).map(Some)
 }
 

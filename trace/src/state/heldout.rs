@@ -334,16 +334,6 @@ impl SearchState<'_> {
         self.unwhitened.units.decrease(before, &after.held_out, &after.of_all)
     }
 
-    /// Starts anew from the declared model, without some candidates, by identifier.
-    pub fn restart_without(&mut self, ids: &[String]) {
-        self.forbid(ids);
-        self.selection = self.declared.clone();
-        self.accepted = self.declared.clone();
-        self.thresholds.clear();
-        self.rejected.clear();
-        self.last_resort = false;
-    }
-
     /// Whether nothing is selected, or the held-out error is below that of the declared model by more than the standard
     /// error of the decrease.
     fn lowers_heldout_error(&self) -> bool {

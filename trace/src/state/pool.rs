@@ -124,7 +124,7 @@ impl SearchState<'_> {
     }
 
     /// Searches some candidates no more, by identifier.
-    pub(super) fn forbid(&mut self, ids: &[String]) {
+    pub fn forbid(&mut self, ids: &[String]) {
         for candidate in self.candidates.iter_mut().filter(|own| ids.contains(&own.effect.id())) {
             Arc::make_mut(candidate).forbidden = true;
         }
