@@ -11,6 +11,8 @@ pub(crate) mod folds;
 mod joint_space;
 mod left_out;
 
+use std::ops::Range;
+
 use abbe_model::Diagnostic;
 use faer::Mat;
 
@@ -19,7 +21,7 @@ use crate::numerics::solve::Svd;
 use crate::numerics::symmetric::Symmetric;
 use crate::numerics::tolerances::MIN_UPDATE_SHARE;
 use crate::numerics::triangle::Triangle;
-use crate::problem::Problem;
+use crate::problem::{Problem, Swept, put};
 pub use figures::cross_validation;
 pub use folds::{FoldKind, Folds, mislabelled_runs};
 pub use joint_space::{coordinates, nearest_of};
@@ -110,28 +112,47 @@ fn predicted(problem: &Problem, beta: &[f64], steps: &[Vec<f64>]) -> Result<(Res
     let predicted = parallel::map(blocks.len(), &|number| {
         let block = &blocks[number];
         let of_test = problem.own_parameters(block.test);
-        let rows = problem.own_rows(&values[block.test], block)?;
-        let present = rows.col(of_test.len()).to_owned();
-        let mut residual = present.clone();
-        let fold_of = &problem.folds.of_row[block.test][block.rows.clone()];
         let channels = problem.channels(block.test);
-        let mut start = 0;
-        for of_fold in fold_of.chunk_by(|a, b| a == b) {
-            let count = of_fold.len() * channels;
-            for (parameter, column) in of_test.iter().zip(rows.col_iter()) {
-                let step = steps[of_fold[0]][*parameter];
-                let own = residual.as_mut().subrows_mut(start, count);
-                own.iter_mut().zip(column.subrows(start, count).iter()).for_each(|(own, d)| *own -= d * step);
-            }
-            start += count;
+        let mut present = vec![0.0; block.rows.len() * channels];
+        let mut changes = present.clone();
+        let mut folds: Vec<(Range<usize>, usize)> = Vec::new();
+        for of_fold in problem.folds.of_row[block.test][block.rows.clone()].chunk_by(|a, b| a == b) {
+            let start = folds.last().map_or(0, |(rows, _)| rows.end);
+            folds.push((start..start + of_fold.len(), of_fold[0]));
         }
-        Ok::<_, Diagnostic>((present, residual))
+        problem.sweep(&values[block.test], block, |output, start, values| {
+            let (channel, own) = match output {
+                Swept::Residual { channel } => {
+                    return put(&mut present[start * channels + channel..], channels, values.iter().copied(), true);
+                }
+                Swept::Derivative { channel, own } => (channel, own),
+            };
+            for (rows, fold) in folds.iter().filter(|(rows, _)| rows.start < start + values.len() && rows.end > start) {
+                let rows = rows.start.max(start)..rows.end.min(start + values.len());
+                let step = |parameter: &usize| steps[*fold][of_test[*parameter]];
+                let first = rows.start * channels + channel;
+                let values = &values[rows.start - start..rows.end - start];
+                let constant: f64 = own.iter().filter(|(_, basis)| basis.is_none()).map(|(own, _)| step(own)).sum();
+                put(&mut changes[first..], channels, values.iter().map(|d| d * constant), false);
+                for (parameter, basis) in own.iter().filter_map(|(own, basis)| Some((own, basis.as_ref()?))) {
+                    let step = step(parameter);
+                    let terms = values.iter().zip(&basis[block.rows.start + rows.start..]);
+                    put(&mut changes[first..], channels, terms.map(|(d, b)| d * b * step), false);
+                }
+            }
+        })?;
+        let first = block.rows.start * channels;
+        for i in (0..present.len()).filter(|i| problem.is_missing(block.test, first + i)) {
+            (present[i], changes[i]) = (0.0, 0.0);
+        }
+        changes.iter_mut().zip(&present).for_each(|(change, present)| *change = present - *change);
+        Ok::<_, Diagnostic>((present, changes))
     });
     // Blocks are in the order of the rows.
     for (block, residual) in blocks.iter().zip(predicted) {
         let (present, without) = residual?;
-        residuals[block.test].extend(present.iter());
-        held_out[block.test].extend(without.iter());
+        residuals[block.test].extend(present);
+        held_out[block.test].extend(without);
     }
     Ok((residuals, held_out))
 }
@@ -208,7 +229,7 @@ mod tests {
     fn simulated(rows: usize, parameters: usize, random: &mut rand_pcg::Pcg64Mcg) -> Triangle {
         let mut triangle = Triangle::new(parameters);
         let block = Mat::from_fn(rows, parameters + 1, |_, _| random.random_range(-1.0..1.0));
-        triangle.absorb(block);
+        triangle.absorb(block.as_ref());
         triangle
     }
 
@@ -246,7 +267,7 @@ mod tests {
         let parameters = 3;
         let mut others = Triangle::new(parameters);
         let block = Mat::from_fn(9, parameters + 1, |_, j| if j == 2 { 0.0 } else { random.random_range(-1.0..1.0) });
-        others.absorb(block);
+        others.absorb(block.as_ref());
         let single_fold = simulated(9, parameters, &mut random);
         let mut whole = others.clone();
         whole.merge(&single_fold);

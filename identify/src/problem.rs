@@ -22,7 +22,7 @@ use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
 use abbe_model::unit::Unit;
-use faer::Mat;
+use faer::{Mat, MatMut};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -67,6 +67,26 @@ pub struct RowBlock {
     pub test: usize,
     /// Its rows.
     pub rows: Range<usize>,
+}
+
+/// An output of the chain of a test.
+pub(crate) enum Swept<'p> {
+    /// Observed − model of a channel.
+    Residual { channel: usize },
+    /// The derivative of a channel by a component: the parameters of the test on which the component depends, each with
+    /// the values of its basis function at the readings.
+    Derivative { channel: usize, own: &'p [(usize, Option<Arc<Vec<f64>>>)] },
+}
+
+/// Writes terms to the entries of a channel, the first of which is given, or adds them.
+pub(crate) fn put(entries: &mut [f64], channels: usize, terms: impl Iterator<Item = f64>, is_new: bool) {
+    // Separate loops for one channel, so that the compiler can vectorise them.
+    match (channels, is_new) {
+        (1, true) => entries.iter_mut().zip(terms).for_each(|(entry, term)| *entry = term),
+        (1, false) => entries.iter_mut().zip(terms).for_each(|(entry, term)| *entry += term),
+        (_, true) => entries.iter_mut().step_by(channels).zip(terms).for_each(|(entry, term)| *entry = term),
+        (_, false) => entries.iter_mut().step_by(channels).zip(terms).for_each(|(entry, term)| *entry += term),
+    }
 }
 
 /// Factor on each channel, mm per internal unit: an angle counts as the length that has the same noise.
@@ -276,7 +296,11 @@ impl Problem {
 
     /// Whether a scalar reading of a test was read and is not excluded.
     pub fn counts(&self, test: usize, scalar: usize) -> bool {
-        !self.rejected[test][scalar / self.channels(test)] && !self.is_missing(test, scalar)
+        let row = match self.channels(test) {
+            1 => scalar,
+            channels => scalar / channels,
+        };
+        !self.rejected[test][row] && !self.is_missing(test, scalar)
     }
 
     /// Whether a scalar reading of a test was not read.
@@ -291,7 +315,7 @@ impl Problem {
 
     /// Number of channels of a reading of a test.
     pub fn channels(&self, test: usize) -> usize {
-        self.models[test].channels().len()
+        self.models[test].weights().len()
     }
 
     /// The noise of a reading, as results have it.
@@ -370,56 +394,109 @@ impl Problem {
     /// # Errors
     /// If the model yields a number that is not finite.
     pub fn own_rows(&self, values: &SlotValues, block: &RowBlock) -> Result<Mat<f64>, Diagnostic> {
+        let (rows, columns) = self.shape(block);
+        let mut rows = Mat::zeros(rows, columns);
+        self.own_rows_into(values, block, rows.as_mut())?;
+        Ok(rows)
+    }
+
+    /// The numbers of rows and columns of [`Problem::own_rows`].
+    fn shape(&self, block: &RowBlock) -> (usize, usize) {
+        (block.rows.len() * self.channels(block.test), self.own_parameters(block.test).len() + 1)
+    }
+
+    /// Writes [`Problem::own_rows`] over other rows.
+    fn own_rows_into(
+        &self,
+        values: &SlotValues,
+        block: &RowBlock,
+        mut rows: MatMut<'_, f64>,
+    ) -> Result<(), Diagnostic> {
         let channels = self.channels(block.test);
-        let own = &self.test_parameters[block.test];
-        let scalars = block.rows.start * channels..block.rows.end * channels;
-        let mut rows = Mat::zeros(scalars.len(), own.parameters.len() + 1);
-        let Some(readings) = &self.tests[block.test].readings else {
-            return Ok(rows);
-        };
-        let observed = &readings.observed[scalars.clone()];
-        let mut columns: Vec<&mut [f64]> =
-            (rows.col_iter_mut()).filter_map(|column| Some(column.try_as_col_major_mut()?.as_slice_mut())).collect();
-        let mut bad = None;
-        self.models[block.test].sweep(values, &own.slots, block.rows.clone(), |output, start, values| {
-            let Some(by) = output.checked_sub(channels) else {
-                let first = start * channels + output;
-                let residuals = columns[own.parameters.len()][first..].iter_mut().step_by(channels);
-                let observed = observed[first..].iter().step_by(channels);
-                for (i, (residual, (observed, value))) in residuals.zip(observed.zip(values)).enumerate() {
-                    *residual = observed - value;
-                    if !residual.is_finite() && bad.is_none() && !observed.is_nan() {
-                        bad = Some((start + i, *value));
-                    }
+        let parameters = self.own_parameters(block.test).len();
+        if self.tests[block.test].readings.is_none() {
+            rows.fill(0.0);
+            return Ok(());
+        }
+        let mut columns: Vec<&mut [f64]> = (rows.as_mut().col_iter_mut())
+            .filter_map(|column| Some(column.try_as_col_major_mut()?.as_slice_mut()))
+            .collect();
+        // For each column and channel, the reading up to which it is written: further terms are added.
+        let mut written = vec![0; parameters * channels];
+        self.sweep(values, block, |output, start, values| {
+            let first = |channel: usize| start * channels + channel;
+            let (channel, own) = match output {
+                Swept::Residual { channel } => {
+                    let entries = &mut columns[parameters][first(channel)..];
+                    return put(entries, channels, values.iter().copied(), true);
                 }
-                return;
+                Swept::Derivative { channel, own } => (channel, own),
             };
-            for (parameter, basis) in &own.contributions[by % own.slots.len()] {
-                let column = &mut columns[*parameter];
-                let mut add = |terms: &mut dyn Iterator<Item = f64>| {
-                    let entries = column[start * channels + by / own.slots.len()..].iter_mut();
-                    entries.step_by(channels).zip(terms).for_each(|(entry, term)| *entry += term);
-                };
+            for (parameter, basis) in own {
+                let written = &mut written[parameter * channels + channel];
+                let is_new = *written <= start;
+                *written = start + values.len();
+                let entries = &mut columns[*parameter][first(channel)..];
                 match basis {
-                    // A separate loop for the simple case, so that the compiler can vectorise it.
-                    None if channels == 1 => {
-                        let entries = column[start..].iter_mut();
-                        entries.zip(values).for_each(|(entry, d)| *entry += d);
-                    }
-                    None => add(&mut values.iter().copied()),
+                    None => put(entries, channels, values.iter().copied(), is_new),
                     Some(basis) => {
                         let basis = &basis[block.rows.start + start..];
-                        add(&mut values.iter().zip(basis).map(|(d, b)| d * b));
+                        put(entries, channels, values.iter().zip(basis).map(|(d, b)| d * b), is_new);
                     }
                 }
             }
-        });
+        })?;
         // A value that was not read says nothing.
-        for i in scalars.clone().filter(|i| self.is_missing(block.test, *i)) {
-            rows.row_mut(i - scalars.start).fill(0.0);
+        let first = block.rows.start * channels;
+        for i in (0..rows.nrows()).filter(|i| self.is_missing(block.test, first + i)) {
+            rows.as_mut().row_mut(i).fill(0.0);
         }
+        Ok(())
+    }
+
+    /// Sweeps the chain of a test with readings over a block. `put` receives an output, the first reading of the values
+    /// relative to the start of the block, and one value per reading, mm and mm per internal unit.
+    ///
+    /// # Errors
+    /// If the model yields a number that is not finite.
+    pub(crate) fn sweep(
+        &self,
+        values: &SlotValues,
+        block: &RowBlock,
+        mut put: impl FnMut(Swept<'_>, usize, &[f64]),
+    ) -> Result<(), Diagnostic> {
+        let Some(readings) = &self.tests[block.test].readings else { return Ok(()) };
+        let channels = self.channels(block.test);
+        let own = &self.test_parameters[block.test];
+        let slots = own.slots.len();
+        let all = &readings.observed[block.rows.start * channels..block.rows.end * channels];
+        let mut residual: Vec<f64> = Vec::new();
+        let mut bad = None;
+        self.models[block.test].sweep(values, &own.slots, block.rows.clone(), |output, start, values| {
+            if let Some(by) = output.checked_sub(channels) {
+                let own = &own.contributions[by % slots];
+                return put(Swept::Derivative { channel: by / slots, own }, start, values);
+            }
+            let observed = || all[start * channels + output..].iter().step_by(channels);
+            residual.clear();
+            residual.resize(values.len(), 0.0);
+            let entries = residual.iter_mut().zip(values);
+            // As in [`put`].
+            match channels {
+                1 => entries.zip(&all[start..]).for_each(|((entry, value), observed)| *entry = observed - value),
+                _ => entries.zip(observed()).for_each(|((entry, value), observed)| *entry = observed - value),
+            }
+            if bad.is_none() && residual.iter().any(|residual| !residual.is_finite()) {
+                let rows = observed().zip(values).zip(&residual).enumerate();
+                let found = |(_, ((observed, _), residual)): &(usize, ((&f64, &f64), &f64))| {
+                    !residual.is_finite() && !observed.is_nan()
+                };
+                bad = rows.into_iter().find(found).map(|(i, ((_, value), _))| (start + i, *value));
+            }
+            put(Swept::Residual { channel: output }, start, &residual);
+        });
         match bad {
-            None => Ok(rows),
+            None => Ok(()),
             Some((row, value)) => {
                 Err(error::not_finite(&self.tests[block.test].name, block.rows.start + row + 1, value))
             }

@@ -57,7 +57,7 @@ pub fn shrinkages(problem: &Problem) -> Result<Vec<Shrinkage>, Diagnostic> {
             for (positions, white) in rows.iter().filter(|_| share > 0.0) {
                 let kept: Vec<usize> =
                     (0..positions.len()).filter(|i| (positions[*i] - middle).abs() <= half).collect();
-                whole.absorb(Mat::from_fn(kept.len(), white.ncols(), |i, j| white[(kept[i], j)]));
+                whole.absorb(Mat::from_fn(kept.len(), white.ncols(), |i, j| white[(kept[i], j)]).as_ref());
             }
             let (rank, covariance) = linear.with(&whole)?;
             let ratios = of_interest.iter().map(|&j| {

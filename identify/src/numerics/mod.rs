@@ -17,6 +17,7 @@ pub(crate) mod products;
 pub mod rank;
 pub mod ranking;
 pub mod reduction;
+mod reflections;
 pub mod regression;
 pub mod solve;
 pub mod symmetric;

@@ -16,7 +16,7 @@ pub trait RowSum: Clone + Send + Sync {
     /// No rows, for the given number of parameters.
     fn new(columns: usize) -> Self;
     /// Adds rows: `block` is rows × (parameters + 1), residuals in the last column.
-    fn absorb(&mut self, block: Mat<f64>);
+    fn absorb(&mut self, block: MatRef<'_, f64>);
     /// Adds the rows of another sum.
     fn merge(&mut self, other: &Self);
     /// The same rows over more parameters: `indices` gives the index of each of these parameters among all.
@@ -28,7 +28,7 @@ impl RowSum for Triangle {
         Triangle::new(columns)
     }
 
-    fn absorb(&mut self, block: Mat<f64>) {
+    fn absorb(&mut self, block: MatRef<'_, f64>) {
         Triangle::absorb(self, block);
     }
 
@@ -149,25 +149,25 @@ impl RowSum for Products {
         Products { lower: Mat::zeros(columns + 1, columns + 1), rows: Mat::zeros(0, 0), waiting: 0 }
     }
 
-    fn absorb(&mut self, block: Mat<f64>) {
+    fn absorb(&mut self, block: MatRef<'_, f64>) {
         if self.waiting > 0 && self.waiting + block.nrows() > ROWS_AT_ONCE {
             add(&mut self.lower, self.rows.get(..self.waiting, ..));
             self.waiting = 0;
         }
         if block.nrows() > ROWS_AT_ONCE {
-            return add(&mut self.lower, block.as_ref());
+            return add(&mut self.lower, block);
         }
         if self.rows.nrows() == 0 {
             self.rows = Mat::zeros(ROWS_AT_ONCE, self.lower.ncols());
         }
-        self.rows.get_mut(self.waiting..self.waiting + block.nrows(), ..).copy_from(&block);
+        self.rows.get_mut(self.waiting..self.waiting + block.nrows(), ..).copy_from(block);
         self.waiting += block.nrows();
     }
 
     fn merge(&mut self, other: &Self) {
         self.lower += &other.lower;
         if other.waiting > 0 {
-            self.absorb(other.rows.get(..other.waiting, ..).to_owned());
+            self.absorb(other.rows.get(..other.waiting, ..));
         }
     }
 
@@ -200,7 +200,7 @@ mod tests {
         for (k, count) in [3, 300, 0, 255, 20, 257].into_iter().enumerate() {
             let rows: Vec<[f64; 4]> =
                 (0..count).map(|_| std::array::from_fn(|_| random.random_range(-1.0..1.0))).collect();
-            sums[k % 2].absorb(Mat::from_fn(count, 4, |i, j| rows[i][j]));
+            sums[k % 2].absorb(Mat::from_fn(count, 4, |i, j| rows[i][j]).as_ref());
             all.extend(rows);
         }
         let [mut sum, other] = sums;

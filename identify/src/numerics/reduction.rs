@@ -56,7 +56,7 @@ impl Triangle {
         let mut triangle = Triangle::of(without_dropped(&r, rows, kept, size)?);
         let mut last = Mat::zeros(1, kept.len() + 1);
         last[(0, kept.len())] = rest.sqrt();
-        triangle.absorb(last);
+        triangle.absorb(last.as_ref());
         Ok(triangle)
     }
 }

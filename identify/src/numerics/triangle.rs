@@ -9,6 +9,8 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::qr::no_pivoting::factor;
 use faer::{Mat, MatRef, Par};
 
+use super::reflections;
+
 /// The triangular factor `[R c; 0 ρ]` of the rows absorbed so far.
 #[derive(Clone, Debug)]
 pub struct Triangle {
@@ -30,7 +32,7 @@ impl Triangle {
     /// The factor of some rows of `[J | r]`.
     pub fn of(rows: Mat<f64>) -> Self {
         let mut triangle = Triangle::new(rows.ncols() - 1);
-        triangle.absorb(rows);
+        triangle.absorb(rows.as_ref());
         triangle
     }
 
@@ -40,14 +42,12 @@ impl Triangle {
     }
 
     /// Absorbs rows: `block` is rows × (parameters + 1), residuals in the last column.
-    pub fn absorb(&mut self, block: Mat<f64>) {
+    pub fn absorb(&mut self, block: MatRef<'_, f64>) {
         if block.nrows() == 0 {
             return;
         }
         let kept = self.factor.nrows();
         let width = self.columns + 1;
-        // A high block is reduced in its place, so that no row is copied.
-        let block = if block.nrows() > 8 * width { upper(block) } else { block };
         // Small blocks (folds of many tests) are collected until they are twice as many as the columns, then reduced
         // together. The factor grows by doubling, so that a block does not copy those before it.
         if kept + block.nrows() <= 2 * width {
@@ -55,13 +55,28 @@ impl Triangle {
                 self.factor.reserve((kept + block.nrows()).max((2 * kept).min(2 * width)), width);
             }
             self.factor.resize_with(kept + block.nrows(), width, |_, _| 0.0);
-            self.factor.get_mut(kept.., ..).copy_from(&block);
+            self.factor.get_mut(kept.., ..).copy_from(block);
             return;
         }
+        if width < BLOCKED {
+            if !self.is_triangular() {
+                self.factor = upper(std::mem::replace(&mut self.factor, Mat::new()));
+            }
+            return reflections::absorb(&mut self.factor, block);
+        }
+        // A high block is reduced before it is stacked.
+        let reduced = (block.nrows() > 8 * width).then(|| upper(block.to_owned()));
+        let block = reduced.as_ref().map_or(block, Mat::as_ref);
         let mut stacked = Mat::zeros(kept + block.nrows(), width);
         stacked.get_mut(..kept, ..).copy_from(&self.factor);
-        stacked.get_mut(kept.., ..).copy_from(&block);
+        stacked.get_mut(kept.., ..).copy_from(block);
         self.factor = upper(stacked);
+    }
+
+    /// Whether the factor is reduced to triangular form.
+    fn is_triangular(&self) -> bool {
+        let width = self.columns + 1;
+        self.factor.nrows() == width && (0..width).all(|j| (j + 1..width).all(|i| self.factor[(i, j)] == 0.0))
     }
 
     /// Rows of `[J | r]` with the same normal matrix as the absorbed rows: any number × (parameters + 1).
@@ -71,7 +86,7 @@ impl Triangle {
 
     /// Absorbs the rows of another factor.
     pub fn merge(&mut self, other: &Triangle) {
-        self.absorb(other.factor.clone());
+        self.absorb(other.factor.as_ref());
     }
 
     /// This factor with others merged into it.
@@ -92,13 +107,7 @@ impl Triangle {
 
     /// The upper-triangular form `[R c; 0 ρ]`: (parameters + 1) × (parameters + 1).
     pub(crate) fn reduced(&self) -> Mat<f64> {
-        let width = self.columns + 1;
-        if self.factor.nrows() == width && (0..width).all(|i| (0..i).all(|j| self.factor[(i, j)] == 0.0)) {
-            return self.factor.clone();
-        }
-        let rows = self.factor.nrows().max(width);
-        let padded = Mat::from_fn(rows, width, |i, j| if i < self.factor.nrows() { self.factor[(i, j)] } else { 0.0 });
-        upper(padded)
+        if self.is_triangular() { self.factor.clone() } else { upper(self.factor.clone()) }
     }
 
     /// `R` (parameters × parameters), `c`, and the minimum `ρ²` of the sum of squares.
@@ -131,15 +140,23 @@ impl Triangle {
     }
 }
 
-/// The factor `R` of a matrix `Q·R` with at least as many rows as columns.
-///
-/// Matrices of fewer than 40 columns are reduced column by column. The library blocks from 16 columns on, which takes
-/// two to four times as long in this range.
+/// Number of columns from which reflections are applied in blocks: below, this takes two to four times as long.
+const BLOCKED: usize = 40;
+/// Number of columns of such a block.
+const BLOCK_COLUMNS: usize = 16;
+
+/// The factor `R` of a matrix `Q·R`: columns × columns.
 pub fn upper(mut matrix: Mat<f64>) -> Mat<f64> {
-    let (rows, columns) = (matrix.nrows(), matrix.ncols());
-    let block_columns = if columns < 40 { 1 } else { 16 };
-    let mut reflections = Mat::zeros(block_columns, columns);
-    let scratch = factor::qr_in_place_scratch::<f64>(rows, columns, block_columns, Par::Seq, Default::default());
+    let columns = matrix.ncols();
+    if columns < BLOCKED {
+        let mut factor = Mat::zeros(columns, columns);
+        reflections::absorb(&mut factor, matrix.as_ref());
+        return factor;
+    }
+    let rows = matrix.nrows().max(columns);
+    matrix.resize_with(rows, columns, |_, _| 0.0);
+    let mut reflections = Mat::zeros(BLOCK_COLUMNS, columns);
+    let scratch = factor::qr_in_place_scratch::<f64>(rows, columns, BLOCK_COLUMNS, Par::Seq, Default::default());
     factor::qr_in_place(
         matrix.as_mut(),
         reflections.as_mut(),

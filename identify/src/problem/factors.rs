@@ -70,15 +70,21 @@ impl Problem {
         blocks: &[RowBlock],
     ) -> Result<SumsByTestAndFold<S>, Diagnostic> {
         let mut sums = SumsByTestAndFold::<S>::new();
+        let (most_rows, most_columns) = (blocks.iter().map(|block| self.shape(block)))
+            .fold((0, 0), |most, (rows, columns)| (most.0.max(rows), most.1.max(columns)));
+        let mut memory = Mat::zeros(most_rows, most_columns);
         for block in blocks {
-            let rows = self.own_rows(&values[block.test], block)?;
+            let (count, columns) = self.shape(block);
+            let mut rows = memory.get_mut(..count, ..columns);
+            self.own_rows_into(&values[block.test], block, rows.as_mut())?;
             let kept = self.kept_rows(block);
             let folds: Vec<usize> = self.folds_of(&kept, block).collect();
-            let white = self.whitened(rows, &kept);
+            self.whiten_in_place(rows.as_mut(), &kept);
+            let rows = rows.as_ref().get(..kept.len(), ..);
             let Some(first) = folds.first() else { continue };
             let none = || S::new(self.test_parameters[block.test].parameters.len());
             if folds.iter().all(|fold| fold == first) {
-                sums.entry((block.test, *first)).or_insert_with(none).absorb(white);
+                sums.entry((block.test, *first)).or_insert_with(none).absorb(rows);
                 continue;
             }
             let mut present = folds.clone();
@@ -86,8 +92,8 @@ impl Problem {
             present.dedup();
             for fold in present {
                 let chosen: Vec<usize> = (0..folds.len()).filter(|i| folds[*i] == fold).collect();
-                let rows = Mat::from_fn(chosen.len(), white.ncols(), |i, j| white[(chosen[i], j)]);
-                sums.entry((block.test, fold)).or_insert_with(none).absorb(rows);
+                let of_fold = Mat::from_fn(chosen.len(), rows.ncols(), |i, j| rows[(chosen[i], j)]);
+                sums.entry((block.test, fold)).or_insert_with(none).absorb(of_fold.as_ref());
             }
         }
         Ok(sums)

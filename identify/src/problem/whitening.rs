@@ -1,6 +1,6 @@
 //! Whitening of rows along a run, without outliers.
 
-use faer::Mat;
+use faer::{Mat, MatMut};
 
 use super::{Problem, RowBlock};
 
@@ -76,6 +76,13 @@ impl Problem {
 
     /// The rows of [`Problem::whiten`] for known remaining rows.
     pub fn whitened(&self, mut rows: Mat<f64>, kept: &[usize]) -> Mat<f64> {
+        self.whiten_in_place(rows.as_mut(), kept);
+        rows.truncate(kept.len(), rows.ncols());
+        rows
+    }
+
+    /// The same in place: the remaining rows come first.
+    pub(super) fn whiten_in_place(&self, rows: MatMut<'_, f64>, kept: &[usize]) {
         let ar_coefficients = &self.noise.ar_coefficients;
         let inflation = self.noise.inflation.sqrt();
         let innovation = 1.0 / (self.noise.innovation_mm() * inflation);
@@ -99,7 +106,5 @@ impl Problem {
                 }
             }
         }
-        rows.truncate(kept.len(), rows.ncols());
-        rows
     }
 }

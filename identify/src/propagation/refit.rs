@@ -213,7 +213,7 @@ impl LeastSquares for SimulatedFit<'_, '_> {
             let mut narrow = Triangle::new(own.len());
             for start in (0..rows.nrows()).step_by(BLOCK_ROWS) {
                 let count = BLOCK_ROWS.min(rows.nrows() - start);
-                narrow.absorb(rows.subrows(start, count).to_owned());
+                narrow.absorb(rows.subrows(start, count));
             }
             whole.merge(&narrow.over_columns(own, beta.len()));
         })?;

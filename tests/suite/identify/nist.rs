@@ -69,7 +69,7 @@ impl<const N: usize, F: Fn(&[Dual<N>; N], f64) -> Dual<N>> LeastSquares for Regr
             })
             .collect();
         let mut triangle = Triangle::new(N);
-        triangle.absorb(faer::Mat::from_fn(rows.len(), N + 1, |i, j| rows[i][j]));
+        triangle.absorb(faer::Mat::from_fn(rows.len(), N + 1, |i, j| rows[i][j]).as_ref());
         Ok(triangle)
     }
 

@@ -168,7 +168,7 @@ mod tests {
             (0..3).map(|_| Mat::from_fn(9, parameters + 1, |_, _| random.random_range(-1.0..1.0))).collect();
         let normal = |rows: &Mat<f64>| {
             let mut sum = <Products as RowSum>::new(parameters);
-            sum.absorb(rows.clone());
+            sum.absorb(rows.as_ref());
             sum.normal()
         };
         let products: Vec<_> = folds.iter().map(normal).collect();
