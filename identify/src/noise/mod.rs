@@ -32,6 +32,8 @@ pub use stated::{rigid_targets, stated_against_repeats};
 use trends::Trends;
 pub use waves::AlongRuns;
 
+use crate::numerics::parallel;
+
 /// The noise of one scalar reading.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -171,7 +173,11 @@ pub struct ShownNoise {
 
 impl ShownNoise {
     /// From repeats; without enough of them, from several targets at each pose. `residuals` are those of any model, mm.
-    pub fn of(tests: &[Test], residuals: &[Vec<f64>], kept: impl Fn(usize, usize) -> bool) -> Option<ShownNoise> {
+    pub fn of(
+        tests: &[Test],
+        residuals: &[Vec<f64>],
+        kept: impl Fn(usize, usize) -> bool + Sync,
+    ) -> Option<ShownNoise> {
         let pure = PureError::of(tests, residuals, &kept);
         if let Some(sigma_mm) = pure.sigma_mm() {
             return Some(ShownNoise { sigma_mm, freedom: pure.freedom, source: NoiseSource::Repeats });
@@ -203,7 +209,7 @@ pub struct PureError {
 impl PureError {
     /// From the residuals of any model. A model error that is equal in all repeats cancels. `kept(test, row)` is false
     /// for outliers.
-    pub fn of(tests: &[Test], residuals: &[Vec<f64>], kept: impl Fn(usize, usize) -> bool) -> PureError {
+    pub fn of(tests: &[Test], residuals: &[Vec<f64>], kept: impl Fn(usize, usize) -> bool + Sync) -> PureError {
         let readings: Vec<Option<&Readings>> = tests.iter().map(|test| test.readings.as_deref()).collect();
         PureError::of_readings(&readings, residuals, kept)
     }
@@ -211,19 +217,23 @@ impl PureError {
     fn of_readings(
         tests: &[Option<&Readings>],
         residuals: &[Vec<f64>],
-        kept: impl Fn(usize, usize) -> bool,
+        kept: impl Fn(usize, usize) -> bool + Sync,
     ) -> PureError {
+        let of_tests = parallel::map(tests.len().min(residuals.len()), &|number| {
+            let residual = &residuals[number];
+            let (mut deviation, mut freedom, mut enlarged) = (vec![None; residual.len()], 0.0, 1.0);
+            if let Some(readings) = tests[number] {
+                (freedom, enlarged) = deviations(readings, residual, |row| kept(number, row), &mut deviation);
+            }
+            (deviation, freedom, enlarged)
+        });
         let mut pure = PureError {
             deviations: Vec::new(),
             freedom: 0,
             freedom_of_tests: Vec::new(),
             rescaling_of_tests: Vec::new(),
         };
-        for (number, (readings, residual)) in tests.iter().zip(residuals).enumerate() {
-            let (mut deviation, mut freedom, mut enlarged) = (vec![None; residual.len()], 0.0, 1.0);
-            if let Some(readings) = readings {
-                (freedom, enlarged) = deviations(readings, residual, |row| kept(number, row), &mut deviation);
-            }
+        for (deviation, freedom, enlarged) in of_tests {
             pure.deviations.push(deviation);
             pure.freedom_of_tests.push(freedom);
             pure.rescaling_of_tests.push(enlarged);
@@ -340,10 +350,13 @@ impl RepeatKeys {
         let directions = if readings.run.is_empty() { Vec::new() } else { directions(readings) };
         let has_directions = directions.iter().any(|direction| *direction != directions[0]);
         let columns = moving.len() + usize::from(has_directions);
-        let mut keys = Vec::with_capacity(readings.rows() * columns);
-        for row in 0..readings.rows() {
-            keys.extend(moving.iter().map(|column| key(column[row])));
-            keys.extend(has_directions.then(|| directions[row]));
+        let mut keys = vec![0; readings.rows() * columns];
+        for (number, positions) in moving.iter().enumerate() {
+            let keys = keys.iter_mut().skip(number).step_by(columns);
+            keys.zip(*positions).for_each(|(to, position)| *to = key(*position));
+        }
+        if has_directions {
+            keys.iter_mut().skip(moving.len()).step_by(columns).zip(&directions).for_each(|(to, code)| *to = *code);
         }
         RepeatKeys { columns, keys }
     }

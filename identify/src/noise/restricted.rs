@@ -33,6 +33,7 @@ use nalgebra::{SMatrix, SVector};
 use super::PureError;
 use super::trends::{TERMS, Trends, orthonormalise};
 use crate::numerics::parallel;
+use crate::numerics::regression::dot;
 
 /// Maximum autoregressive order.
 pub(super) const MAX_ORDER: usize = 3;
@@ -186,7 +187,20 @@ impl AlikeRuns {
             let of_runs = parallel::map(runs.len(), &|run| {
                 let d = &runs[run];
                 let (square, along) = (|i: usize, j: usize| d[i] * d[j], |i: usize, j: usize| q[i] * d[j]);
-                (sums.of(square, one_by_one(square)), sums.of(along, one_by_one(along)))
+                let squares = sums.of(square, |stretch, lag| {
+                    let (later, before) = lagged(stretch, lag);
+                    let product = dot(&d[later], &d[before]);
+                    if lag == 0 { product } else { 2.0 * product }
+                });
+                let along = sums.of(along, |stretch, lag| {
+                    let (later, before) = lagged(stretch, lag);
+                    SVector::<f64, TERMS>::from_fn(|term, _| {
+                        let terms = terms.col_as_slice(term);
+                        let product = dot(&terms[later.clone()], &d[before.clone()]);
+                        if lag == 0 { product } else { product + dot(&terms[before.clone()], &d[later.clone()]) }
+                    })
+                });
+                (squares, along)
             });
             let mut squares = vec![0.0; of_runs.first().map_or(0, |(squares, _)| squares.len())];
             for (of_run, _) in &of_runs {
@@ -196,9 +210,9 @@ impl AlikeRuns {
                 |i: usize, j: usize| SVector::<f64, PAIRS>::from_iterator(pairs().map(|(s, t)| q[i][s] * q[j][t]));
             // A run with an outlier has terms of its own, so that these are most of the products.
             let trend = sums.of(product, |stretch, lag| {
-                let count = stretch.len() - lag;
-                let later = terms.subrows(stretch.start + lag, count);
-                let products = later.transpose() * terms.subrows(stretch.start, count);
+                let (later, before) = lagged(stretch, lag);
+                let products =
+                    terms.subrows(later.start, later.len()).transpose() * terms.subrows(before.start, before.len());
                 let both = |s: usize, t: usize| products[(s, t)] + if lag == 0 { 0.0 } else { products[(t, s)] };
                 SVector::from_iterator(pairs().map(|(s, t)| both(s, t)))
             });
@@ -275,6 +289,11 @@ impl LaggedStretches<'_> {
     }
 }
 
+/// The places of a stretch that have another one so many before them, and these others.
+fn lagged(stretch: &Range<usize>, lag: usize) -> (Range<usize>, Range<usize>) {
+    (stretch.start + lag..stretch.end, stretch.start..stretch.end - lag)
+}
+
 /// What lagged products are.
 trait Summand: Copy + Default + Add<Output = Self> + AddAssign {}
 
@@ -288,11 +307,6 @@ fn sum<T: Summand>(terms: impl Iterator<Item = T>) -> T {
 
 fn both<T: Summand>(product: &impl Fn(usize, usize) -> T, i: usize, lag: usize) -> T {
     if lag == 0 { product(i, i) } else { product(i, i - lag) + product(i - lag, i) }
-}
-
-/// The sum of a product over a stretch at a lag.
-fn one_by_one<T: Summand>(product: impl Fn(usize, usize) -> T) -> impl Fn(&Range<usize>, usize) -> T {
-    move |stretch, lag| sum((stretch.start + lag..stretch.end).map(|i| both(&product, i, lag)))
 }
 
 /// The predictions of a value of a process of unit variance from values before it.

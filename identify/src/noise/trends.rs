@@ -66,6 +66,8 @@ type Terms = Vec<[f64; TERMS]>;
 pub struct Trends {
     /// The rows of each run, in order.
     runs: Vec<Range<usize>>,
+    /// The run of each row; empty without runs.
+    run_of: Vec<u32>,
     /// For each run, which of the terms are its own.
     terms_of_run: Vec<usize>,
     /// Whole runs of one length share their terms.
@@ -75,7 +77,7 @@ pub struct Trends {
 impl Trends {
     /// The trends over the rows that are not excluded. Readings without runs have no trend.
     pub fn of(readings: &Readings, kept: impl Fn(usize) -> bool) -> Trends {
-        let mut trends = Trends { runs: Vec::new(), terms_of_run: Vec::new(), terms: Vec::new() };
+        let mut trends = Trends { runs: Vec::new(), run_of: Vec::new(), terms_of_run: Vec::new(), terms: Vec::new() };
         if readings.run.is_empty() {
             return trends;
         }
@@ -100,6 +102,7 @@ impl Trends {
             if is_whole {
                 of_length.insert(run.len(), number);
             }
+            trends.run_of.resize(run.end, trends.runs.len() as u32);
             trends.terms_of_run.push(number);
             trends.runs.push(run);
         }
@@ -108,8 +111,7 @@ impl Trends {
 
     /// The run of a row; `None` without runs.
     fn run(&self, row: usize) -> Option<usize> {
-        let number = self.runs.partition_point(|run| run.end <= row);
-        (number < self.runs.len()).then_some(number)
+        self.run_of.get(row).map(|run| *run as usize)
     }
 
     /// The terms of the trend at a row.
