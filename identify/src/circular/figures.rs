@@ -33,7 +33,7 @@ pub(super) fn figures(machine: &Arc<Machine>, test: &Test, path: &Path) -> Circu
         MovingAxes::Linear { axes, radius_mm, .. } => (axes.map(name).concat(), Some(radius_mm)),
         MovingAxes::Rotary(axis) => (name(axis), None),
     };
-    let set_up = SetUp::of(machine, test);
+    let set_up = SetUp::of(machine, test, &path.model);
     let traces = [1.0, -1.0].map(|direction| mean(path, direction));
     let mut not_identifiable = Vec::new();
     // Otherwise the readings still contain the set-up of the balls, or errors of the linear axes.
@@ -79,7 +79,7 @@ pub(super) fn figures(machine: &Arc<Machine>, test: &Test, path: &Path) -> Circu
                 range(if sign > 0.0 { one } else { other })
             });
             let u = FigureUncertainties::of(path, trace, &deviations_mm, &set_up);
-            let width_mm = width_mm(path, sign).filter(|_| is_error_motion);
+            let width_mm = if is_error_motion { width_mm(path, sign) } else { None };
             let values = [
                 Some(((most - least).min(about_both) * 1e3, u.range_um)),
                 Some((most * 1e3, u.max_um)),

@@ -18,7 +18,9 @@ mod set_up;
 
 pub use results::{CircularTest, Diagnosis, DirectionFigures};
 
-use abbe_model::session::Session;
+use abbe_model::session::{Session, Test};
+
+use crate::numerics::parallel;
 
 /// The characteristics of every ball-bar test with a circular path, and of every one in which a rotary axis turns.
 ///
@@ -26,16 +28,16 @@ use abbe_model::session::Session;
 /// linear axes come from its own diagnosis instead: what a fit without these faults rejects may be a reversal spike.
 pub fn of_session(session: &Session, noise_mm: f64, left_out: &[Vec<bool>]) -> Vec<CircularTest> {
     let measured = session.tests.iter().filter(|test| test.readings.is_some());
-    let mut results: Vec<CircularTest> = measured
-        .zip(left_out)
-        .filter_map(|(test, left_out)| {
-            let mut path = path::Path::of(&session.machine, test)?;
-            path.left_out = diagnosis::reject_outliers(&session.machine, &path).unwrap_or_else(|| left_out.clone());
-            let mut result = figures::figures(&session.machine, test, &path);
-            diagnosis::add(&session.machine, &path, noise_mm, &mut result);
-            Some(result)
-        })
-        .collect();
+    let measured: Vec<(&Test, &Vec<bool>)> = measured.zip(left_out).collect();
+    let results = parallel::map(measured.len(), &|number| {
+        let (test, left_out) = measured[number];
+        let mut path = path::Path::of(&session.machine, test)?;
+        path.left_out = diagnosis::reject_outliers(&session.machine, &path).unwrap_or_else(|| left_out.clone());
+        let mut result = figures::figures(&session.machine, test, &path);
+        diagnosis::add(&session.machine, &path, noise_mm, &mut result);
+        Some(result)
+    });
+    let mut results: Vec<CircularTest> = results.into_iter().flatten().collect();
     compare_feeds(&mut results);
     results
 }

@@ -45,6 +45,8 @@ pub(super) struct DirectionRun {
 /// A test's path.
 #[derive(Clone, Debug)]
 pub(super) struct Path {
+    /// The model of the test.
+    pub model: TestModel,
     pub moves: MovingAxes,
     pub runs: Vec<DirectionRun>,
     /// Angle of each row, rad, unwrapped within a run.
@@ -94,6 +96,7 @@ impl Path {
         };
         let feed_mm_s = feed(&samples, !readings.time_s.is_empty());
         Some(Path {
+            model,
             moves,
             runs,
             angle,

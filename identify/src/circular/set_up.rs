@@ -9,8 +9,6 @@
 //!
 //! A figure is read at the angles at which the deviation is greatest and least.
 
-use std::sync::Arc;
-
 use abbe_model::chain::Machine;
 use abbe_model::instrument::ballbar::BAR;
 use abbe_model::sensitivity::{SlotValues, TestModel};
@@ -48,11 +46,7 @@ pub(super) struct FigureUncertainties {
 
 impl SetUp {
     /// The set-up of a test with readings.
-    pub fn of(machine: &Arc<Machine>, test: &Test) -> SetUp {
-        let Some(readings) = &test.readings else {
-            return SetUp(Vec::new());
-        };
-        let model = TestModel::new(Arc::clone(machine), test.station.clone(), readings);
+    pub fn of(machine: &Machine, test: &Test, model: &TestModel) -> SetUp {
         let first = machine.error_slots();
         let uncertain = test.priors.iter().take(BAR).enumerate().filter_map(|(k, prior)| match prior {
             Prior::Known => None,
