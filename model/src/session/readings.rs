@@ -182,15 +182,13 @@ impl Readings {
         if self.run.is_empty() {
             return std::iter::once(0..rows).filter(|run| !run.is_empty()).collect();
         }
-        let mut runs = Vec::new();
-        let mut start = 0;
-        for row in 1..=rows {
-            if row == rows || self.run[row] != self.run[start] {
-                runs.push(start..row);
-                start = row;
-            }
-        }
-        runs
+        let mut end = 0;
+        let run = |numbers: &[i64]| {
+            let start = end;
+            end += numbers.len();
+            start..end
+        };
+        self.run.chunk_by(|a, b| a == b).map(run).collect()
     }
 
     /// Driver samples of an axis for every row: position, direction, speed, distance and time since the last reversal.
