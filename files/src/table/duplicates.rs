@@ -6,7 +6,7 @@
 //! with neither column is taken as it is.
 
 use std::collections::HashMap;
-use std::hash::{DefaultHasher, Hasher};
+use std::hash::Hasher;
 use std::ops::Range;
 use std::path::Path;
 
@@ -15,9 +15,41 @@ use abbe_model::session::readings::Readings;
 /// Largest number of lines listed in a message.
 const MAX_LISTED: usize = 8;
 
+/// Hashes the cells of a row by folded products of 64 bits. A row has few short cells, for each of which the general hasher
+/// takes ten times as long.
+#[derive(Default)]
+pub(super) struct CellHasher(u64);
+
+impl CellHasher {
+    /// Digits of π and of the golden ratio.
+    const START: u64 = 0x2438_6a88_85a3_08d3;
+    const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
+
+    fn mix(&mut self, word: u64) {
+        let product = u128::from(self.0 ^ word ^ CellHasher::START) * u128::from(CellHasher::FACTOR);
+        self.0 = (product as u64) ^ ((product >> 64) as u64);
+    }
+}
+
+impl Hasher for CellHasher {
+    fn write(&mut self, bytes: &[u8]) {
+        let (words, rest) = bytes.as_chunks::<8>();
+        words.iter().for_each(|word| self.mix(u64::from_le_bytes(*word)));
+        // The length separates a cell from the next one.
+        let mut last = [0; 8];
+        last[..rest.len()].copy_from_slice(rest);
+        last[7] = rest.len() as u8 + 1;
+        self.mix(u64::from_le_bytes(last));
+    }
+
+    fn finish(&self) -> u64 {
+        self.0
+    }
+}
+
 /// A hash of all cells of a row, which `add` adds.
-pub(super) fn hash_of(add: impl FnOnce(&mut DefaultHasher)) -> u64 {
-    let mut hasher = DefaultHasher::new();
+pub(super) fn hash_of(add: impl FnOnce(&mut CellHasher)) -> u64 {
+    let mut hasher = CellHasher::default();
     add(&mut hasher);
     hasher.finish()
 }

@@ -1,6 +1,6 @@
 //! Readings from columns in memory: the same names, units and checks as the columns of a file.
 
-use std::hash::{DefaultHasher, Hash};
+use std::hash::Hash;
 use std::path::Path;
 
 use abbe_model::Diagnostic;
@@ -9,10 +9,11 @@ use abbe_model::session::limits;
 
 use super::columns::quantities;
 use super::columns::{Column, Role, known, listed};
+use super::duplicates::{self, CellHasher};
 use super::fill::{Cells, Filled, Filling, NOT_ENOUGH};
 use super::missing;
 use super::request::Request;
-use super::{duplicates, required};
+use super::required;
 use crate::check;
 use crate::spelling::suggestion;
 
@@ -82,7 +83,7 @@ impl Cells for Item<'_> {
         self.given[column.index].missing.get(self.item) == Some(&true)
     }
 
-    fn hash(&self, hasher: &mut DefaultHasher) {
+    fn hash(&self, hasher: &mut CellHasher) {
         for column in self.given {
             match column.values {
                 Values::Numbers(numbers) => numbers[self.item].to_bits().hash(hasher),
