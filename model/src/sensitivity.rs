@@ -171,15 +171,17 @@ impl TestModel {
     }
 
     /// The slots that can affect a reading of this test: the applied errors of the axes between ball and bed (a linear
-    /// axis has no position errors), and all parameters of the instrument. Without a workpiece point, the axes on the
-    /// workpiece side are excluded.
+    /// axis has no position errors), and all parameters of the instrument. Without a point there, the axes on the workpiece
+    /// side are excluded.
     pub fn effective_slots(&self) -> Vec<usize> {
         let two_sided = self.station.kind().is_two_sided();
+        let targets = self.station.points().into_iter().flatten();
+        let carriers: Vec<usize> = targets.flat_map(|point| self.machine.carriers(point.target.frame)).collect();
         let machine = (0..self.machine.error_slots()).filter(|slot| {
             let axis = slot / crate::chain::ERRORS_PER_AXIS;
             let within = slot % crate::chain::ERRORS_PER_AXIS;
             let applied = self.machine.axes[axis].kind == AxisKind::Rotary || within >= 3;
-            applied && (two_sided || axis >= self.machine.workpiece_side)
+            applied && (two_sided || axis >= self.machine.workpiece_side || carriers.contains(&axis))
         });
         machine.chain(self.machine.error_slots()..self.slots()).collect()
     }

@@ -61,7 +61,7 @@ fn laser(optic: Target<f64>, reflector: Target<f64>) -> Station<f64> {
 }
 
 /// Every instrument between two points.
-fn every_station(table: [f64; 3], tool: [f64; 3]) -> [Station<f64>; 15] {
+fn every_station(table: [f64; 3], tool: [f64; 3]) -> [Station<f64>; 16] {
     let (on_bed, on_last) = (Target { frame: Frame::Bed, mm: table }, Target { frame: Frame::Axis(0), mm: tool });
     let (table, tool) = (Target::on_table(table), Target::on_tool(tool));
     let angle = |body| Station::Angle(Angle { about: vec![[0.0, 0.6, 0.8], [1.0, 0.0, 0.0]], body });
@@ -82,6 +82,7 @@ fn every_station(table: [f64; 3], tool: [f64; 3]) -> [Station<f64>; 15] {
         distance(table),
         distance(on_bed),
         ball_bar(on_bed, on_last),
+        Station::Tracker(Tracker { target: table, stand: stand(), is_polar: false }),
         laser(on_last, tool),
         Station::Pointing(Pointing { directions, is_free: true }),
     ]
