@@ -53,7 +53,7 @@ struct Inputs {
 
 /// The model of a machine: its text, and its checksum; `None` if it cannot be read.
 struct Model {
-    source: Result<Source, String>,
+    source: Result<Source, Diagnostic>,
     sha256: Option<String>,
 }
 
@@ -187,7 +187,7 @@ fn model_of(machine_id: &str, places: &Places) -> Option<Model> {
     if name.len() > LONGEST_NAME || matches!(file.try_exists(), Ok(false)) {
         return None;
     }
-    let source = abbe_files::text(&file, "the model file").map_err(|error| error.to_string());
+    let source = abbe_files::text(&file, "the model file");
     let sha256 = source.as_ref().ok().and_then(|source| source.stamp.as_ref()?.sha256());
     Some(Model { source, sha256 })
 }
@@ -195,47 +195,33 @@ fn model_of(machine_id: &str, places: &Places) -> Option<Model> {
 /// Analyses what was read.
 fn record(inputs: Inputs, should_continue: ShouldContinue<'_>) -> Result<Record, Diagnostic> {
     let Inputs { read, mut record, model } = inputs;
-    let failed = |record: Record, stage: &str, message: String| {
-        let error = Some(ErrorRecord { stage: stage.to_string(), message });
-        Ok(Record { error, ..record })
-    };
-    let session = match read {
-        Ok((session, _)) => session,
-        Err(message) => return failed(record, "read", message),
-    };
-    let stage = if record.options.no_trace { "fit" } else { "trace" };
-    // A fault of the program in one session must not end the others.
-    let analysed = catch_unwind(AssertUnwindSafe(|| identify(&mut record, &session, should_continue)));
-    match analysed {
-        _ if !should_continue() => return Err(interrupted()),
-        Ok(Ok(())) => {}
-        Ok(Err(error)) => return failed(record, stage, error.to_string()),
-        Err(_) => return failed(record, stage, FAULT.to_string()),
-    }
-    if let Some(Model { source, sha256 }) = model {
-        let source = match source {
-            Ok(source) => source,
-            Err(message) => return failed(record, "validate", message),
-        };
-        let model = || model_file::of_source(&source);
-        let validated = catch_unwind(AssertUnwindSafe(|| validate(&model()?, &session)));
-        match validated {
-            Ok(Ok(validation)) => {
-                let result = validation.result;
-                record.validation = Some(ValidationRecord {
-                    model_sha256: sha256.unwrap_or_default(),
-                    verdict: result.verdict,
-                    rms_um: result.model.residual.rms.rms_um,
-                    moved: result.moved.into_iter().map(|moved| moved.change.id).collect(),
-                });
-                record.warnings.extend(result.warnings);
+    let analysed = match read {
+        Err(message) => Err(ErrorRecord { stage: "read".to_string(), message }),
+        Ok((session, _)) => {
+            let stage = if record.options.no_trace { "fit" } else { "trace" };
+            let identified = guarded(stage, || identify(&mut record, &session, should_continue));
+            if !should_continue() {
+                return Err(interrupted());
             }
-            // The estimates do not depend on the model: they stay.
-            Ok(Err(error)) => return failed(record, "validate", error.to_string()),
-            Err(_) => return failed(record, "validate", FAULT.to_string()),
+            // The estimates do not depend on the model: they stay if its validation fails.
+            identified.and_then(|()| match model {
+                Some(model) => guarded("validate", || judge(&mut record, model, &session)),
+                None => Ok(()),
+            })
         }
-    }
+    };
+    record.error = analysed.err();
     Ok(record)
+}
+
+/// A stage of the analysis. A fault of the program in one session must not end the others.
+fn guarded(stage: &str, work: impl FnOnce() -> Result<(), Diagnostic>) -> Result<(), ErrorRecord> {
+    let message = match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(Ok(())) => return Ok(()),
+        Ok(Err(error)) => error.to_string(),
+        Err(_) => FAULT.to_string(),
+    };
+    Err(ErrorRecord { stage: stage.to_string(), message })
 }
 
 const FAULT: &str = "a fault of abbe: the computation broke off; please report it with the session";
@@ -282,5 +268,18 @@ fn identify(record: &mut Record, session: &Session, should_continue: ShouldConti
     record.conformity = found.result.conformity;
     record.warnings = found.result.warnings;
     record.model = Some(found.result.after);
+    Ok(())
+}
+
+/// Validation of the machine's model.
+fn judge(record: &mut Record, model: Model, session: &Session) -> Result<(), Diagnostic> {
+    let result = validate(&model_file::of_source(&model.source?)?, session)?.result;
+    record.validation = Some(ValidationRecord {
+        model_sha256: model.sha256.unwrap_or_default(),
+        verdict: result.verdict,
+        rms_um: result.model.residual.rms.rms_um,
+        moved: result.moved.into_iter().map(|moved| moved.change.id).collect(),
+    });
+    record.warnings.extend(result.warnings);
     Ok(())
 }

@@ -14,7 +14,7 @@ use abbe_identify::results::ParameterChange;
 const SIGNIFICANCE: f64 = 0.001;
 /// Least cosine between a change and its explanation.
 const DIRECTION: f64 = 0.9;
-/// Smallest eigenvalue of a correlation matrix that counts.
+/// Smallest eigenvalue of a correlation matrix that counts. Below it, parameters are fully correlated.
 const LEAST_EIGENVALUE: f64 = 1e-9;
 
 /// What a change is.
@@ -71,6 +71,14 @@ pub(super) struct Change {
     pub found: Vec<usize>,
 }
 
+/// A root of the inverse of a covariance, by its correlation and its standard uncertainties.
+pub(super) fn inverse_root(correlation: &Mat<f64>, u: &[f64]) -> Option<Mat<f64>> {
+    let eigen = Symmetric::of(correlation.as_ref()).ok()?;
+    let largest = eigen.values.iter().copied().fold(0.0, f64::max);
+    let root = |k: usize| eigen.values[k].max(LEAST_EIGENVALUE * largest).sqrt();
+    Some(Mat::from_fn(u.len(), u.len(), |k, j| eigen.vectors[(j, k)] / (root(k) * u[j])))
+}
+
 /// The metric of the inverse covariance.
 struct Metric {
     /// A root of the inverse covariance.
@@ -85,10 +93,7 @@ impl Metric {
             return None;
         }
         let correlation = Mat::from_fn(count, count, |i, j| covariance[(i, j)] / (u[i] * u[j]));
-        let eigen = Symmetric::of(correlation.as_ref()).ok()?;
-        let largest = eigen.values.iter().copied().fold(0.0, f64::max);
-        let root = |k: usize| eigen.values[k].max(LEAST_EIGENVALUE * largest).sqrt();
-        Some(Metric { root: Mat::from_fn(count, count, |k, j| eigen.vectors[(j, k)] / (root(k) * u[j])) })
+        Some(Metric { root: inverse_root(&correlation, &u)? })
     }
 
     fn product(&self, a: &[f64], b: &[f64]) -> f64 {

@@ -10,11 +10,8 @@ use super::series::Series;
 use super::sessions::{Dated, Machine};
 use super::{DAYS_PER_YEAR, chart};
 use abbe_identify::numerics::regression::Regression;
-use abbe_identify::numerics::symmetric::Symmetric;
 use abbe_identify::results::MeasuredValue;
 
-/// Smallest eigenvalue of a correlation matrix that counts. Below it, parameters of a session are fully correlated.
-const LEAST_EIGENVALUE: f64 = 1e-9;
 /// Years ahead in which a due date is stated.
 const HORIZON_YEARS: f64 = 10.0;
 
@@ -147,10 +144,7 @@ impl<'m> Fitted<'m> {
         if correlation.col_iter().any(|column| column.iter().any(|entry| !entry.is_finite())) {
             return Some(Mat::from_fn(count, count, |i, j| if i == j { 1.0 / u[i] } else { 0.0 }));
         }
-        let eigen = Symmetric::of(correlation.as_ref()).ok()?;
-        let largest = eigen.values.iter().copied().fold(0.0, f64::max);
-        let root = |k: usize| eigen.values[k].max(LEAST_EIGENVALUE * largest).sqrt();
-        Some(Mat::from_fn(count, count, |k, j| eigen.vectors[(j, k)] / (root(k) * u[j])))
+        events::inverse_root(&correlation, &u)
     }
 
     /// The history of the machine.
@@ -222,7 +216,7 @@ impl<'m> Fitted<'m> {
             unit,
             meaning,
             points: points.collect(),
-            p_value: series.p_value(),
+            p_value: series.p_value,
             scatter_ratio: series.scatter,
             enlargement: series.enlargement,
             level: first.map(|(joint, first)| joint.estimate(first)),

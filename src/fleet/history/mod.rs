@@ -186,11 +186,11 @@ fn modelled(all: &[Vec<Series>], priors: &[Vec<Prior>], options: &HistoryOptions
         };
         all[k].iter().zip(&priors[k]).map(test).collect::<Vec<_>>()
     });
-    let p_values: Vec<f64> = tested.iter().flatten().map(|(series, _)| series.p_value()).collect();
+    let p_values: Vec<f64> = tested.iter().flatten().map(|(series, _)| series.p_value).collect();
     let threshold = benjamini_hochberg(&p_values, options.false_discovery_rate);
     let models = parallel::map(tested.len(), &|k| {
         let series = tested[k].iter().cloned();
-        let model = |(series, steps): (Series, Vec<usize>)| match series.p_value() <= threshold {
+        let model = |(series, steps): (Series, Vec<usize>)| match series.p_value <= threshold {
             true => series.searched(&steps, threshold),
             false => series,
         };

@@ -69,7 +69,8 @@ pub(super) struct Series {
     /// Variance of the sessions about the model, in units of the stated one, beside the prior, and its degrees of
     /// freedom.
     variance: (f64, f64),
-    p_value: f64,
+    /// Probability of a change as large as the largest of this series if there is none.
+    pub p_value: f64,
 }
 
 impl Series {
@@ -128,11 +129,6 @@ impl Series {
         let distinct = steps.iter().enumerate().all(|(k, step)| !steps[..k].contains(step));
         let inside = steps.iter().all(|step| *step > 0 && *step < self.sessions.len());
         distinct && inside && self.solved(drift, &steps).is_some()
-    }
-
-    /// Probability of a change as large as the largest of this series if there is none.
-    pub fn p_value(&self) -> f64 {
-        self.p_value
     }
 
     /// The series as a level, with a prior of its scatter and the p value of its most significant change.
