@@ -20,8 +20,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::printers::csv;
-use crate::report::compensation::uncertainties;
-use crate::report::export as present;
+use crate::report::export::{self as present, uncertainties};
 use crate::report::table::Table;
 
 /// A format.

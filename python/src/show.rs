@@ -2,7 +2,7 @@
 
 use abbe::files::SourceMap;
 use abbe::model::session::Session;
-use abbe::printers::{csv, html, notebook, page, terminal};
+use abbe::printers::{csv, html, page, terminal};
 use abbe::report::block::Report;
 use abbe::report::figure;
 use abbe::report::figure::svg;
@@ -100,7 +100,7 @@ pub fn figures(report: &Report) -> Vec<Figure> {
 
 /// A report as `print` and a notebook show it: text and HTML.
 pub fn shown(report: &Report) -> (String, String) {
-    (terminal::report(report, Some("`report` writes them")), notebook::html(report))
+    (terminal::report(report, Some("`report` writes them")), html::notebook(report))
 }
 
 /// The page of a report; `called` is what was called in Python.

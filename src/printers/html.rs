@@ -236,3 +236,16 @@ fn words(text: &Text) -> Markup {
         Text::Controls => html! { div class="controls needs-script" id="controls" hidden {} },
     }
 }
+
+/// The key blocks of a report in a notebook, without a page around them.
+pub fn notebook(report: &Report) -> String {
+    let sections = sections(report, &[Level::Brief, Level::Key]);
+    let contents = html! {
+        h3 { (report.title) }
+        @for (_, heading, contents) in &sections {
+            @if !heading.is_empty() { h4 { (heading) } }
+            (contents)
+        }
+    };
+    contents.into_string()
+}

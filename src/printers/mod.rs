@@ -2,7 +2,6 @@
 
 pub mod csv;
 pub mod html;
-pub mod notebook;
 pub mod page;
 pub mod paper;
 pub mod sheet;
@@ -55,7 +54,7 @@ mod tests {
         let page = page::html(&report, &Provenance::of_command(None)).unwrap();
         contains(&page, &[&common[..], &["title", "section", "fold", "detail", "page", "figure"]].concat());
         assert!(!page.contains("brief-words") && page.contains("verdict-word"));
-        contains(&notebook::html(&report), &[&common[..], &["title", "section", "brief"]].concat());
+        contains(&html::notebook(&report), &[&common[..], &["title", "section", "brief"]].concat());
         let csv = String::from_utf8(csv::report(&report).unwrap()).unwrap();
         assert_eq!(csv, "# section-words\nheading-words\ncell-words\n");
         let layout = Layout { class: Class::Elsarticle, two_column: false };

@@ -1,12 +1,12 @@
-//! Exported descriptions as tables.
+//! Exported descriptions as tables, and the standard uncertainty of each point of compensation tables.
 
 use std::path::PathBuf;
 
 use abbe::apply::compare::workspace::AxisRange;
+use abbe::apply::compensation::PointUncertainty;
 use abbe::apply::export::dh::{DhTables, FixedPose, PARAMETERS};
 use abbe::apply::export::kinematics::{EntryChoice, KinematicTable};
 use abbe::apply::export::neutral::AxisPlace;
-
 use abbe::exports::ExportResult;
 use abbe::files::robot::dh::Convention;
 
@@ -169,6 +169,17 @@ pub fn kinematics(table: &KinematicTable) -> Table {
     let mut printed = Table::new(columns, rows);
     printed.notes = notes(table);
     printed
+}
+
+/// One row per point: position, error and u, with their units.
+pub fn uncertainties(points: &[PointUncertainty]) -> Table {
+    let rows = points.iter().map(|point| {
+        let direction = point.direction.map_or("both", |direction| if direction > 0.0 { "+" } else { "-" });
+        let [position, value, u] = [point.position, point.value, point.u].map(|number| Cell::fixed(number, 6));
+        cells![point.error.to_string(), position, point.axis.unit().name(), direction, value, u, point.unit]
+    });
+    let columns = ["error", ">position", "position_unit", "direction", ">value", ">u", "unit"];
+    Table::new(columns, rows)
 }
 
 #[cfg(test)]

@@ -19,13 +19,11 @@ use super::commands::Commands;
 use super::number::{fixed, places, unit};
 use super::parameters::Estimates;
 use super::quality;
+use super::session;
 use super::session::plots::SessionPlots;
-use super::session::{self, residuals};
 use super::statements::{self, IDENTIFIES, IMPROVES};
 use super::table::{Cell, Column, Table, cells, numbers, words};
-use super::{
-    base, circular, conformity, confounded, cross_validation, plausibility, pointing, positioning, straightness,
-};
+use super::{conformity, confounded, parameters, plausibility, standards};
 
 /// The report of a fit; with `figures`, for a page.
 ///
@@ -63,21 +61,21 @@ pub fn report(
     }
     estimates.errors(&mut report, model.outcome.goodness, None);
     if let Some(base) = &result.base {
-        report.headed(Level::Key, "Base parameters", base::base_parameters(base));
-        report.key(base::base_statement(base));
+        report.headed(Level::Key, "Base parameters", parameters::base(base));
+        report.key(parameters::base_statement(base));
     }
     if let Some(terms) = &result.tpoint {
-        report.headed(Level::Key, "Terms of TPOINT", pointing::terms(terms));
-        report.key(pointing::statement(terms));
+        report.headed(Level::Key, "Terms of TPOINT", parameters::pointing(terms));
+        report.key(parameters::pointing_statement(terms));
     }
     report.detail(statements::corrections(statements));
     estimates.set_up(&mut report, None);
     conformity::section(&mut report, result.conformity.as_ref());
     confounded::section(&mut report, model);
-    circular::section(&mut report, &result.circular);
-    positioning::section(&mut report, &result.positioning);
-    positioning::diagonals(&mut report, &result.diagonals, &result.largest_of_diagonals);
-    straightness::section(&mut report, &result.straightness);
+    standards::circular(&mut report, &result.circular);
+    standards::positioning(&mut report, &result.positioning);
+    standards::diagonals(&mut report, &result.diagonals, &result.largest_of_diagonals);
+    standards::straightness(&mut report, &result.straightness);
     report.section("Next");
     let steps = next(problem, result, statements.measure.step, commands);
     let page = commands.command("fit", "--report fit.html");
@@ -90,7 +88,7 @@ pub fn report(
     let series = views(problem, fit, None)?;
     let plots = SessionPlots::new(problem, &series);
     let before = if plots.is_polar() { "nominal machine and set-up" } else { "nominal machine, fitted set-up" };
-    residuals::figures(&mut report, &plots, &spectrum::spectra(problem, &series), [before, "fit"]);
+    session::residuals(&mut report, &plots, &spectrum::spectra(problem, &series), [before, "fit"]);
     session::add_data(&mut report, &plots, &model.parameters);
     session::traces(&mut report, &plots);
     session::correlations(&mut report, problem, fit);
@@ -218,7 +216,7 @@ impl Figures {
     pub fn residual(&mut self, section: &str, model: &ModelResult) {
         self.figure(section, "rms", "", model.fit.rms_um, model.noise.unit.name());
         self.figure(section, "held out", "", model.fit.heldout_rms_um, model.noise.unit.name());
-        for figure in cross_validation::figures(model) {
+        for figure in quality::held_out(model) {
             self.figure(section, figure.name, "", figure.rms_um, figure.unit.name());
         }
     }

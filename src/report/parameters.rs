@@ -1,11 +1,14 @@
-//! Estimated parameters: errors and effects apart from set-up parameters, with their uncertainties.
+//! Estimated parameters: errors and effects apart from set-up parameters, with their uncertainties; base parameters, a minimal
+//! set of numbers that predicts the same readings; terms of a pointing model, and the residual on the sky.
 
 use abbe::identify::fit::Fit;
+use abbe::identify::fit::base::BaseResult;
+use abbe::identify::fit::tpoint::PointingTerms;
 use abbe::identify::plausibility::{Pull, Pulls};
 use abbe::identify::problem::Problem;
 use abbe::identify::results::{DeterminedBy, Estimate, Goodness, MeasuredValue};
 use abbe::model::parameter_id::ParameterId;
-use abbe::model::words::counted;
+use abbe::model::words::{counted, with_exponent};
 
 use super::block::{Report, Text};
 use super::figure::bars::{Row, values};
@@ -181,4 +184,70 @@ fn figures(estimates: &[&Estimate], before: Option<&[Estimate]>, name: &str, tit
         }
     }
     figures
+}
+
+/// The base parameters with u.
+pub fn base(result: &BaseResult) -> Table {
+    let rows = result.parameters.iter().map(|parameter| {
+        let [value, u] = Cell::estimate(parameter.value, parameter.u);
+        cells![&parameter.id, value, u, unit(&parameter.unit), &parameter.meaning]
+    });
+    Table::new(["parameter", ">value", ">u", "unit", "meaning"], rows)
+        .titled("Base parameters with standard uncertainty u")
+}
+
+/// What is held at nominal, and what does not depend on it.
+pub fn base_statement(base: &BaseResult) -> String {
+    let held = match base.held_at_nominal.as_slice() {
+        [] => "No parameter is held at nominal: all are separable.".to_string(),
+        names => format!(
+            "Held at nominal ({}): {}. Predictions do not depend on this choice (largest change {} µm).",
+            counted(names.len(), "parameter"),
+            names.join(", "),
+            with_exponent(base.prediction_change_um, 0)
+        ),
+    };
+    match base.combinations_at_nominal {
+        0 => held,
+        count => format!(
+            "{held} {} of the base parameters {} at nominal too: the readings determine {} by less than their noise.",
+            counted(count, "combination"),
+            if count == 1 { "stays" } else { "stay" },
+            if count == 1 { "it" } else { "them" }
+        ),
+    }
+}
+
+/// The terms with u, and with the sigma that TPOINT prints.
+pub fn pointing(found: &PointingTerms) -> Table {
+    let rows = found.terms.iter().map(|term| {
+        let [value, u] = match (term.value_arcsec, term.u_arcsec) {
+            (Some(value), Some(u)) => Cell::estimate(value, u),
+            _ => [Cell::or_dash(None), Cell::or_dash(None)],
+        };
+        let sigma = Cell::or_dash(term.sigma_arcsec.map(|sigma| Cell::fixed(sigma, 2)));
+        cells![&term.term, value, u, sigma, term.parameters.join(", ")]
+    });
+    Table::new(["term", ">value, \u{2033}", ">u, \u{2033}", ">sigma of TPOINT, \u{2033}", "parameters"], rows)
+        .titled("Terms of TPOINT with standard uncertainty u")
+}
+
+/// The residual on the sky, what sigma is, and what is no term.
+pub fn pointing_statement(found: &PointingTerms) -> String {
+    let mut text = format!(
+        "Sky rms {:.2}\u{2033}{}, {} stars. TPOINT\u{2019}s sigma takes the \
+         sky rms, of both coordinates together, for the standard deviation of each one, so it is about \u{221a}2 u.",
+        found.sky_rms_arcsec,
+        found
+            .population_sd_arcsec
+            .map_or(String::new(), |sd| format!(", population standard deviation {sd:.2}\u{2033}")),
+        found.stars
+    );
+    if found.terms.iter().any(|term| term.value_arcsec.is_none()) {
+        text.push_str(" A term without a value is not separable from others.");
+    }
+    if !found.without_term.is_empty() {
+        text.push_str(&format!(" No term of TPOINT: {}.", found.without_term.join(", ")));
+    }
+    text
 }

@@ -1,13 +1,13 @@
-//! Key figures of a model: agreement of residual and noise, held-out error, rank and readings.
+//! Key figures of a model: agreement of residual and noise, held-out errors by what is held out (interpolation and
+//! extrapolation of poses, left-out tests), rank and readings.
 
 use abbe::identify::noise::{NoiseSource, ReadingNoise};
 use abbe::identify::problem::Problem;
 use abbe::identify::results::{Goodness, GoodnessVerdict, ModelResult, NotJudged};
 use abbe::model::unit::Unit;
-use abbe::model::words::counted;
+use abbe::model::words::{counted, first_of};
 
 use super::block::KeyFigure;
-use super::cross_validation;
 use super::number::{integer, of_readings, three_digits};
 
 /// χ²/ν; a dash without degrees of freedom.
@@ -56,7 +56,7 @@ pub fn key_figures(model: &ModelResult, before: Option<&ModelResult>) -> Vec<Key
 
 /// What is held out, and the held-out errors that do not decide.
 pub fn held_out_sentences(model: &ModelResult, before: Option<&ModelResult>) -> Vec<String> {
-    let others = cross_validation::sentences(model, before);
+    let others = other_held_out(model, before);
     std::iter::once(format!("held out: leaving out {}", model.heldout_by)).chain(others).collect()
 }
 
@@ -157,4 +157,80 @@ pub fn reservation(goodness: Goodness) -> Option<&'static str> {
             "not to be quoted: the model lacks an effect, and u does not cover the bias that it causes in the estimates"
         }
     })
+}
+
+/// Maximum number of tests that a sentence names.
+const MAX_NAMED: usize = 5;
+
+/// A held-out error with its name: rms over scalar readings, and rms length of the vector, µm.
+pub struct HeldOutFigure {
+    /// What it tests.
+    pub name: &'static str,
+    /// Its unit.
+    pub unit: Unit,
+    /// Over scalar readings.
+    pub rms_um: f64,
+    /// Of the vector, for instruments with three coordinates.
+    pub rms_3d_um: Option<f64>,
+}
+
+impl HeldOutFigure {
+    /// The figure with its unit: `0.305 µm`, or `254 µm (vector 440 µm)`.
+    pub fn in_words(&self) -> String {
+        match self.rms_3d_um {
+            Some(length) => {
+                format!("{} (vector {})", of_readings(self.rms_um, self.unit), of_readings(length, self.unit))
+            }
+            None => of_readings(self.rms_um, self.unit),
+        }
+    }
+}
+
+/// The held-out errors of a model that it has.
+pub fn held_out(model: &ModelResult) -> Vec<HeldOutFigure> {
+    let found = &model.cross_validation;
+    let all = [
+        ("extrapolation", found.extrapolation_rms_um, found.extrapolation_rms_3d_um),
+        ("interpolation", found.interpolation_rms_um, found.interpolation_rms_3d_um),
+        ("left-out run", found.left_out_run_rms_um, found.left_out_run_rms_3d_um),
+        ("left-out test", found.left_out_test_rms_um, found.left_out_test_rms_3d_um),
+    ];
+    let present = all.into_iter().filter_map(|(name, rms_um, rms_3d_um)| {
+        Some(HeldOutFigure { name, unit: model.noise.unit, rms_um: rms_um?, rms_3d_um })
+    });
+    present.collect()
+}
+
+/// The held-out errors that do not decide, one sentence each, compared with those of a first model if there is one.
+fn other_held_out(model: &ModelResult, before: Option<&ModelResult>) -> Vec<String> {
+    let found = &model.cross_validation;
+    let earlier = before.map(held_out).unwrap_or_default();
+    let mut sentences = Vec::new();
+    for figure in held_out(model) {
+        let value = match earlier.iter().find(|one| one.name == figure.name) {
+            Some(before) => format!("before {}, after {}", before.in_words(), figure.in_words()),
+            None => figure.in_words(),
+        };
+        match figure.name {
+            "interpolation" if found.extrapolation_rms_um.is_some() => {
+                sentences.push(format!(
+                    "held-out blocks test extrapolation, and decide; interpolation, over random poses: {value}"
+                ));
+            }
+            "left-out test" => {
+                let tests = first_of(&found.left_out_tests, MAX_NAMED, ", ", "");
+                sentences.push(format!("left-out test: {value} ({tests}, each predicted by the other tests)"));
+            }
+            _ => {}
+        }
+    }
+    if !found.tests_not_left_out.is_empty() {
+        let tests = found.tests_not_left_out.iter();
+        let tests = tests.map(|test| format!("{} (needs {})", test.test, test.parameters.join(", ")));
+        sentences.push(format!(
+            "not predicted by the other tests: {}",
+            first_of(&tests.collect::<Vec<_>>(), MAX_NAMED, ", ", "")
+        ));
+    }
+    sentences
 }

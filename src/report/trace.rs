@@ -12,16 +12,16 @@ use abbe::trace::result::{EffectResult, PriorResult, TraceResult};
 
 use super::block::{KeyFigure, Level, Report, Sentence, Text};
 use super::commands::{Commands, TRACED};
-use super::effect::name;
+use super::effects::name;
 use super::fit::{Figures, rank};
 use super::number::{capitalised, integer, of_readings, p_value, quantity, unit, value_and_u};
 use super::parameters::Estimates;
 use super::quality;
+use super::session;
 use super::session::plots::SessionPlots;
-use super::session::{self, residuals};
 use super::statements::{self, IDENTIFIES};
 use super::table::{Cell, Table, cells, numbers, words};
-use super::{conformity, confounded, effects, plausibility, uniqueness};
+use super::{conformity, confounded, effects, plausibility};
 
 /// Effects that the opening names.
 const MAX_NAMED: usize = 3;
@@ -44,7 +44,7 @@ pub fn report(
     report.method = method(result);
     report.values = values(result);
     let mut sentences = vec![Sentence::Words(verdict(result))];
-    sentences.extend(uniqueness::headline(result).map(|headline| format!("{}.", capitalised(&headline)).into()));
+    sentences.extend(effects::headline(result).map(|headline| format!("{}.", capitalised(&headline)).into()));
     sentences.extend(plausibility::headline(&result.plausibility).map(Sentence::from));
     sentences.extend(conformity::failed(result.conformity.as_ref()).map(Sentence::from));
     sentences.extend(statements::opening(statements, &problem.session, result.after.degrees_of_freedom, commands));
@@ -99,7 +99,7 @@ pub fn report(
     let plots = SessionPlots::new(problem, &series);
     let models = if earlier.is_none() { ["declared model"; 2] } else { ["declared model", "with the found effects"] };
     report.section("Residuals");
-    residuals::figures(&mut report, &plots, &spectrum::spectra(problem, &series), models);
+    session::residuals(&mut report, &plots, &spectrum::spectra(problem, &series), models);
     session::add_data(&mut report, &plots, &result.after.parameters);
     session::traces(&mut report, &plots);
     session::correlations(&mut report, problem, &trace.after_fit);
@@ -201,7 +201,7 @@ fn key_figures(trace: &TraceOutcome) -> Vec<KeyFigure> {
     match result.effects.as_slice() {
         [] => {}
         [one] if one.unique => {
-            figures.push(KeyFigure::new("Uniqueness", "unique", format!("among {}", uniqueness::screened(result))));
+            figures.push(KeyFigure::new("Uniqueness", "unique", format!("among {}", effects::screened(result))));
         }
         [one] => {
             let count = format!("1 of {}", one.explanation_count);
@@ -219,7 +219,7 @@ fn key_figures(trace: &TraceOutcome) -> Vec<KeyFigure> {
 fn measure_next(result: &TraceResult) -> Vec<String> {
     let sentences = result.effects.iter().enumerate().flat_map(|(k, effect)| {
         let about = if result.effects.len() > 1 { format!("Effect {}: ", k + 1) } else { String::new() };
-        uniqueness::tests(effect, name).into_iter().map(move |sentence| format!("{about}{sentence}"))
+        effects::tests(effect, name).into_iter().map(move |sentence| format!("{about}{sentence}"))
     });
     sentences.collect()
 }

@@ -16,7 +16,7 @@ use abbe::trace::candidates::named::effect;
 use super::PaperArguments;
 use crate::cli::failure::command_line;
 use crate::report::paper::contents::{self, Study};
-use crate::report::paper::{Part, SUBJECTS, Subject, comparison, equations, methods};
+use crate::report::paper::{Part, SUBJECTS, Subject, equations};
 
 /// Effects of the bias table where none are named.
 const BIASING_EFFECTS: usize = 12;
@@ -51,7 +51,7 @@ pub fn parts(arguments: &PaperArguments, studies: &[Study]) -> Result<Vec<Part>,
             continue;
         }
         let section = match subject {
-            Subject::Methods => Some(methods::part(study)),
+            Subject::Methods => Some(contents::methods(study)),
             Subject::SetUp => Some(contents::set_up(study)),
             Subject::Equations => Some(equations::part(study, arguments.two_column)?),
             Subject::Sensitivity => Some(contents::sensitivity(study)?),
@@ -59,7 +59,7 @@ pub fn parts(arguments: &PaperArguments, studies: &[Study]) -> Result<Vec<Part>,
             Subject::Correlation => Some(contents::correlation(study)),
             Subject::Identifiability => Some(contents::identifiability(study)),
             Subject::Bias => Some(contents::bias(study)),
-            Subject::Comparison => (studies.len() > 1).then(|| comparison::part(studies)),
+            Subject::Comparison => (studies.len() > 1).then(|| contents::comparison(studies)),
             Subject::Trace => contents::trace(study)?,
         };
         match section {

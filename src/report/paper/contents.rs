@@ -1,5 +1,7 @@
-//! What the sections hold: selections of the tables and figures of a plan and of a fit.
+//! What the sections hold: the text of the methods, selections of the tables and figures of a plan and of a fit, several plans
+//! side by side.
 
+use abbe::identify::noise::NoiseSource;
 use abbe::identify::problem::Problem;
 use abbe::identify::series::{paths, views};
 use abbe::model::Diagnostic;
@@ -13,13 +15,12 @@ use super::{Part, Subject};
 use crate::report::block::{Formula, Report};
 use crate::report::figure::bars::{NAMED, bars};
 use crate::report::figure::{Figure, Quantity, drawing, space};
-use crate::report::number::{three_digits, unit, with_symbols};
+use crate::report::number::{of_readings, three_digits, unit, with_symbols};
 use crate::report::parameters;
 use crate::report::plan::{analysis as plan, indices};
 use crate::report::session::plots::SessionPlots;
-use crate::report::session::residuals::test_table;
 use crate::report::session::{self, curves};
-use crate::report::table::{Align, Column, Table, cells};
+use crate::report::table::{Align, Cell, Column, Table, cells};
 
 /// Tests of a drawing of set-ups.
 const MAX_SET_UPS: usize = 8;
@@ -243,7 +244,7 @@ pub fn trace(study: &Study) -> Result<Option<Part>, Diagnostic> {
     let mut report = Report::new("Estimates and residuals");
     let all: Vec<_> = fitted.result.model.parameters.iter().collect();
     report.key(parameters::table(&all, None).named("estimates"));
-    let residuals = test_table(&plots, models).titled("Root mean square residual of each test");
+    let residuals = session::test_table(&plots, models).titled("Root mean square residual of each test");
     report.key(residuals.named("residuals"));
     let figures = plots.tests().flat_map(|(number, _)| match plots.polar_residuals(number, models) {
         Some(polar) => polar,
@@ -251,4 +252,156 @@ pub fn trace(study: &Study) -> Result<Option<Part>, Diagnostic> {
     });
     report.figures(figures.take(MAX_FIGURES));
     Ok(Some(Part { subject: Subject::Trace, report }))
+}
+
+/// Machine, tests, parameters, estimation and uncertainty in words, every number from the result.
+pub fn methods(study: &Study) -> Part {
+    let mut report = Report::new("Methods");
+    [measured(study), estimation(study), propagation(study)].into_iter().for_each(|text| report.key(text));
+    if let Some(fitted) = &study.fitted {
+        let model = &fitted.result.model;
+        let enlarged = if model.fit.u_enlargement > 1.0 {
+            format!(
+                " The residual exceeds the noise significantly, so that all uncertainties are enlarged by {:.2}.",
+                model.fit.u_enlargement
+            )
+        } else {
+            String::new()
+        };
+        let source = match model.noise.source {
+            NoiseSource::Stated => "is that of the instrument",
+            NoiseSource::Repeats => "is estimated from repeated readings",
+            NoiseSource::Targets => "is estimated from the distances between the targets at each pose",
+            _ => "is estimated from the residual",
+        };
+        let coefficients: Vec<String> =
+            model.noise_ar_coefficients.iter().map(|coefficient| format!("{coefficient:.2}")).collect();
+        let along_runs = match coefficients.len() {
+            0 => String::new(),
+            order => format!(
+                " Along a run the noise is an autoregression of order {order} ({}), from repeated readings.",
+                coefficients.join(", ")
+            ),
+        };
+        report.key(format!(
+            "The fit of {} has a root mean square residual of {} and of {} for held-out readings ({} left out in turn). \
+             The noise standard deviation of {} {source}.{along_runs} χ² is {:.0} for {} degrees of freedom (Birge ratio {:.2}).{enlarged}",
+            counted(model.fit.readings, "reading"),
+            of_readings(model.fit.rms_um, model.noise.unit),
+            of_readings(model.fit.heldout_rms_um, model.noise.unit),
+            model.heldout_by,
+            of_readings(model.noise.value, model.noise.unit),
+            model.chi_square,
+            model.degrees_of_freedom,
+            model.birge_ratio,
+        ));
+    }
+    Part { subject: Subject::Methods, report }
+}
+
+fn measured(study: &Study) -> String {
+    let (session, analysis) = (&study.problem.session, &study.analysis);
+    let instrument = session.instrument.entry().phrase;
+    let moving = analysis.moving_min.map_or(String::new(), |min| format!(" and {min:.1} min of movement"));
+    format!(
+        "The machine {} has the structural code {} (from workpiece to tool, b is the bed). It is measured with {instrument} \
+         in {} with {}{moving}, from {}. Errors are named by ISO 230-1 [@iso230].",
+        session.machine.name,
+        session.machine.code(),
+        counted(analysis.tests.len(), "test"),
+        counted(analysis.readings, "reading"),
+        counted(analysis.setup_count, "set-up"),
+    )
+}
+
+fn estimation(study: &Study) -> String {
+    let list = &study.problem.parameters.list;
+    let setups = list.iter().filter(|parameter| parameter.id.is_setup()).count();
+    let errors = list.len() - setups;
+    let analysis = &study.analysis;
+    let rank = if analysis.rank == list.len() {
+        "all parameters are identifiable".to_string()
+    } else {
+        let indices = &analysis.indices;
+        format!("{} of {} are identifiable", indices.identifiable_count, counted(indices.error_count, "error"))
+    };
+    format!(
+        "A reading is computed by the kinematic chain with exact derivatives. The {} and {} are estimated together by \
+         least squares with the Gauss-Newton method. Each linearisation is reduced by orthogonal transformations to a \
+         triangular factor [@demmel2012], so that no information is lost by squaring. The numerical rank is {} of {}: {rank}. \
+         A direction counts as identifiable if a change by 1 mm or 0.01 rad along it changes the readings by at least one \
+         standard deviation in total. Combinations that are not identifiable keep their nominal values.",
+        counted(errors, "error"),
+        counted(setups, "set-up parameter"),
+        analysis.rank,
+        list.len(),
+    )
+}
+
+fn propagation(study: &Study) -> String {
+    format!(
+        "The covariance of the estimates follows from the noise of a reading ({}) and from the priors of the set-up by the \
+         law of propagation of uncertainty [@jcgm100;@jcgm102]. Stated uncertainties are standard uncertainties.",
+        of_readings(study.analysis.noise.value, study.analysis.noise.unit)
+    )
+}
+
+/// Predicted uncertainties, ranks and observability indices of two plans or more side by side.
+pub fn comparison(studies: &[Study]) -> Part {
+    let text = "The predicted standard uncertainties of the plans, the ranks of their parameters and their observability \
+                indices are compared. A dash marks an error that a plan does not identify. The indices refer to the errors \
+                that each plan identifies, so that they compare only plans of the same errors.";
+    let mut report = Report::new("Comparison of plans");
+    report.key(text);
+    report.key(uncertainties(studies).named("comparison-uncertainty"));
+    report.key(indices_of(studies).named("comparison-indices"));
+    Part { subject: Subject::Comparison, report }
+}
+
+fn column(study: &Study) -> Column {
+    Column { heading: study.label.clone(), align: Align::Right }
+}
+
+fn uncertainties(studies: &[Study]) -> Table {
+    let mut errors: Vec<(&str, &str)> = Vec::new();
+    for error in studies.iter().flat_map(|study| &study.analysis.errors) {
+        if !errors.contains(&(&error.id, &error.unit)) {
+            errors.push((&error.id, &error.unit));
+        }
+    }
+    let rows = errors.iter().map(|(id, name)| {
+        let mut row = cells![*id, unit(name)];
+        row.extend(studies.iter().map(|study| {
+            let error = study.analysis.errors.iter().find(|error| error.id == *id);
+            Cell::from(error.and_then(|error| error.u).map_or("–".to_string(), three_digits))
+        }));
+        row
+    });
+    let columns = ["error", "unit"].map(Column::from).into_iter().chain(studies.iter().map(column));
+    Table::new(columns, rows).titled("Predicted standard uncertainty of each error by each plan")
+}
+
+fn indices_of(studies: &[Study]) -> Table {
+    let figure = |name: &str, of: &dyn Fn(&Study) -> String| {
+        let mut row = cells![name];
+        row.extend(studies.iter().map(|study| Cell::from(of(study))));
+        row
+    };
+    let rows = [
+        figure("tests", &|study| study.analysis.tests.len().to_string()),
+        figure("readings", &|study| study.analysis.readings.to_string()),
+        figure("set-ups", &|study| study.analysis.setup_count.to_string()),
+        figure("parameters", &|study| study.structure.parameter_count.to_string()),
+        figure("rank", &|study| study.structure.rank.to_string()),
+        figure("identifiable errors", &|study| study.analysis.indices.identifiable_count.to_string()),
+        figure("condition number", &|study| three_digits(study.analysis.indices.condition_number)),
+        figure("O1", &|study| three_digits(study.analysis.indices.o1)),
+        figure("O2", &|study| three_digits(study.analysis.indices.o2)),
+        figure("O3", &|study| three_digits(study.analysis.indices.o3)),
+        figure("O4", &|study| three_digits(study.analysis.indices.o4)),
+        figure("O5", &|study| three_digits(study.analysis.indices.o5)),
+        figure("D-efficiency", &|study| three_digits(study.analysis.indices.d_efficiency)),
+    ];
+    let columns = [Column::from("figure")].into_iter().chain(studies.iter().map(column));
+    Table::new(columns, rows).titled("Ranks and observability indices of the plans")
 }

@@ -1,9 +1,7 @@
 //! The parts of `abbe paper`: selections of text, tables and figures, from results.
 
-pub mod comparison;
 pub mod contents;
 pub mod equations;
-pub mod methods;
 
 use abbe::identify::problem::Problem;
 use abbe::model::parameter_id::ParameterId;

@@ -7,9 +7,9 @@ use abbe::model::Diagnostic;
 use abbe::model::words::counted;
 use abbe::plan::results::{ErrorAnalysis, PlanAnalysis};
 
-use super::values::values;
 use super::{
     budgets, clearances, correlation, effects, indices, sensitivity as sensitivities, small_plots, uncertainties,
+    values,
 };
 use crate::report::block::{KeyFigure, Level, Report, Text};
 use crate::report::commands::{Commands, SIMULATED};

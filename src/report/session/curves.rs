@@ -9,8 +9,7 @@ use abbe::model::effect::shape::Harmonic;
 use abbe::model::effect::{Effect, Shape};
 use abbe::model::words::{counted, cut};
 
-use super::decimate;
-use super::plots::{MAX_TESTS, SessionPlots};
+use super::plots::{MAX_TESTS, SessionPlots, interval_extremes};
 use crate::report::figure::bars::{NAMED, bars};
 use crate::report::figure::lines::{Axis, Lines, Mark, Name, Series};
 use crate::report::figure::polar::panels;
@@ -84,7 +83,7 @@ pub fn over_time(session: &SessionPlots<'_>) -> Figure {
     }
     let intervals = (TIME_INTERVALS / tests.len().max(1)).max(MIN_INTERVALS);
     let of = |time: &[f64], values: &[f64]| -> Vec<(f64, f64)> {
-        let extremes = decimate::interval_extremes(time, values, intervals);
+        let extremes = interval_extremes(time, values, intervals);
         extremes.into_iter().flat_map(|(centre, minimum, maximum)| [(centre, minimum), (centre, maximum)]).collect()
     };
     let all = |column: usize| tests.iter().flat_map(move |(_, test)| test[column].iter().copied());

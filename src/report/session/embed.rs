@@ -6,8 +6,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
-use super::abscissae::axes_of;
-use super::plots::{Column, SessionPlots};
+use super::plots::{Column, SessionPlots, axes_of};
 use crate::report::number::unit;
 use crate::report::table::{self, Cell, Table, cells, numbers};
 

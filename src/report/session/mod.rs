@@ -1,36 +1,35 @@
 //! The readings of a session as figures, and the sections of them that several reports share: residuals, traces,
 //! correlations, sensitivities, the machine.
 //!
-//! - [`sky`], [`workspace`]: residuals where independent poses are;
-//! - [`plots`]: deviations and residuals of each test; [`curves`]: derived quantities; [`residuals`]: their section;
-//! - [`abscissae`]: what they are plotted against; [`decimate`]: decimation that keeps extremes;
+//! - [`sky`]: residuals where directions are;
+//! - [`plots`]: deviations and residuals of each test; [`curves`]: derived quantities;
 //! - [`embed`]: data of the interactive figures of a page.
 
-pub mod abscissae;
 pub mod curves;
-pub mod decimate;
 pub mod embed;
 pub mod plots;
-pub mod residuals;
 pub mod sky;
-pub mod workspace;
 
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::Estimate;
+use abbe::identify::series::places::{View, views};
+use abbe::identify::series::spectrum::Spectrum;
 use abbe::identify::series::{Cause, correlation};
 use abbe::model::Diagnostic;
 use abbe::model::component::ErrorName;
 use abbe::model::effect::Component;
 use abbe::model::parameter_id::EffectId;
+use abbe::model::words::counted;
 use serde_json::json;
 
-use self::plots::SessionPlots;
-use self::residuals::{omitted_tests, unaffected};
+use self::plots::{MAX_TESTS, SessionPlots};
 use super::block::{Report, Text};
+use super::figure::bubbles::bubbles;
 use super::figure::matrix::matrix;
-use super::figure::{Figure, chain};
-use super::number::{unit, value_and_u, with_minus_signs};
+use super::figure::{Figure, Quantity, chain};
+use super::number::{integer, micrometres, unit, value_and_u, with_minus_signs};
+use super::table::{Table, cells, numbers, words};
 
 /// Maximum number of rows of a correlation map.
 const MAX_CORRELATED: usize = 40;
@@ -147,4 +146,107 @@ pub fn chain(problem: &Problem) -> Figure {
     });
     let errors: Vec<(&ErrorName, String)> = errors.map(|name| (name, name.to_string())).chain(effects).collect();
     chain::figure(&problem.session.machine, &errors)
+}
+
+/// Residuals of every test before and after, by the names of the two models. Tests that do not change are folded.
+pub fn residuals(report: &mut Report, session: &SessionPlots<'_>, spectra: &[Spectrum], models: [&str; 2]) {
+    let amplitudes = spectra.iter().flat_map(|spectrum| spectrum.before_um.iter().chain(&spectrum.after_um));
+    let maximum = amplitudes.copied().fold(0.0, f64::max);
+    let is_polar = session.is_polar() && session.tests().any(|(_, test)| test.way.is_angle);
+    let of_test = |number: usize| -> Vec<Figure> {
+        let polar = session.polar_residuals(number, models).unwrap_or_default();
+        polar.into_iter().chain(straight(session, number, spectra, maximum)).collect()
+    };
+    let places = [("On the sky", sky::panels(session)), ("Over the workspace", over_places(session))];
+    let mut places = places.into_iter().filter(|(_, drawn)| !drawn.is_empty()).peekable();
+    let has_places = places.peek().is_some();
+    for (heading, drawn) in places {
+        report.page(Text::Heading(heading.to_string()));
+        report.figures(drawn);
+    }
+    if has_places {
+        report.page(Text::Heading("Each test".to_string()));
+    }
+    let (affected, folded) = unaffected(session);
+    for number in affected {
+        if is_polar {
+            report.page(Text::Heading(session.series.tests[number].name.clone()));
+        }
+        report.figures(of_test(number));
+    }
+    report.page(omitted_tests(session));
+    if let Some((heading, numbers)) = folded {
+        report.page(Text::Fold(heading));
+        report.figures(numbers.into_iter().flat_map(of_test));
+    }
+    report.page(Text::Heading("All tests".to_string()));
+    report.detail(test_table(session, models));
+    report.figures([curves::over_time(session)]);
+    report.figures((!is_polar).then(|| curves::histogram(session, models)));
+}
+
+/// The numbers of the tests whose residual the model changes; of the others, if there are any, their numbers under a
+/// heading that names them.
+fn unaffected(session: &SessionPlots<'_>) -> (Vec<usize>, Option<(String, Vec<usize>)>) {
+    let numbers = session.tests().map(|(number, _)| number);
+    let (affected, others): (Vec<usize>, Vec<usize>) = numbers.partition(|number| session.is_affected(*number));
+    let names: Vec<&str> = others.iter().map(|number| session.series.tests[*number].name.as_str()).collect();
+    let heading = format!("{} without a change of the residual: {}", counted(names.len(), "test"), names.join(", "));
+    (affected, (!others.is_empty()).then_some((heading, others)))
+}
+
+/// Figures of one test with straight axes: residuals, and their spectra on one scale.
+fn straight(session: &SessionPlots<'_>, number: usize, spectra: &[Spectrum], maximum_um: f64) -> Vec<Figure> {
+    let name = &session.series.tests[number].name;
+    let effects = &session.problem.parameters.effects;
+    let own = spectra.iter().filter(|spectrum| &spectrum.of == name);
+    let own = own.map(|spectrum| curves::spectrum_plot(spectrum, maximum_um, effects));
+    session.residuals(number).into_iter().chain(own).collect()
+}
+
+/// Readings and RMS residuals of every test.
+pub fn test_table(session: &SessionPlots<'_>, models: [&str; 2]) -> Table {
+    let has_change = session.has_change();
+    let rows = session.series.tests.iter().enumerate().map(|(number, test)| {
+        let [before, after] = session.rms_um(number).map(micrometres);
+        let mut row = cells![&test.name, integer(test.after_um.len() / test.channels), after];
+        if has_change {
+            row.insert(2, before.into());
+        }
+        row
+    });
+    let [before, after] = models.map(|model| numbers(format!("rms, {model}")));
+    let mut columns = vec![words("test"), numbers("readings"), after];
+    if has_change {
+        columns.insert(2, before);
+    }
+    Table::new(columns, rows)
+}
+
+/// A note about tests without plots of their own.
+fn omitted_tests(session: &SessionPlots<'_>) -> Text {
+    let tests = session.series.tests.len();
+    let note = format!("Plots are shown for the first {MAX_TESTS} of {tests} tests. The data contain all tests.");
+    Text::List(if tests > MAX_TESTS { vec![note] } else { Vec::new() })
+}
+
+/// Two views before and after; none for readings along runs and for directions of the sky.
+fn over_places(session: &SessionPlots<'_>) -> Vec<Figure> {
+    let are_directions = session.problem.models.iter().all(|model| model.channels().iter().all(|one| one.is_angle()));
+    if are_directions {
+        return Vec::new();
+    }
+    views(session.problem, session.series).iter().map(|view| over_place(session, view)).collect()
+}
+
+fn over_place(session: &SessionPlots<'_>, view: &View) -> Figure {
+    let [first, second] = &view.names;
+    let size = Quantity::new("residual", session.series.unit.name());
+    let place = if view.unit == "mm" { "the nominal place of the target in R" } else { "both joints" };
+    Figure::new(
+        format!("residual-over-{first}-{second}"),
+        format!("Residual over {first} and {second}"),
+        format!("Diameter: rms length of the residual in a cell, over {place}."),
+        bubbles(view, &size, session.has_change()),
+    )
 }
