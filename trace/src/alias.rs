@@ -4,8 +4,8 @@
 //! Either its evidence is then at most 2 lower, or χ² is at most 4 higher: 2 in the log-likelihood. Every tuned number of
 //! the alias that the found effect does not have has to lower χ² by 4. Selected positions count with their penalty if the
 //! found effect has positions too. The alias also reproduces at least half of the found effect's signature in the readings.
-//! The most probable one is named ([`super::result`]), by likelihood, description length and mechanical plausibility
-//! (`plausible.rs`). The others are listed, the most probable first.
+//! The search reports the candidate with the shortest description. The others are listed, the most probable first: by
+//! likelihood and by mechanical plausibility (`plausible.rs`).
 
 use std::cmp::Ordering;
 use std::collections::HashSet;
@@ -36,21 +36,10 @@ pub(super) struct Alias {
 }
 
 impl Alias {
-    /// `ln` of its probability over that of the found effect, by likelihood, description length and mechanical plausibility.
-    /// A difference within its numerical error is none.
+    /// `ln` of its probability over that of the found effect, by likelihood and mechanical plausibility.
     pub fn ln_probability_ratio(&self) -> f64 {
-        rounded(-0.5 * self.delta_chi2 - self.prior_cost, DECIMALS_OF_LN)
+        -0.5 * self.delta_chi2 - self.prior_cost
     }
-}
-
-/// A named effect among the explanations of the readings.
-pub(super) struct Explanations {
-    /// Its aliases, the most probable first.
-    pub aliases: Vec<Alias>,
-    /// It and the candidates that compete with it, best first.
-    pub competing: Vec<CompetingEffect>,
-    /// Decrease of the sum of squares by the effect beside the others.
-    pub gain: f64,
 }
 
 /// A candidate that competes with a found effect.
@@ -87,25 +76,25 @@ fn simplest_first(search: &SearchState<'_>, a: usize, b: usize) -> Ordering {
         .then(a.cmp(&b))
 }
 
-/// The competing explanations of the `k`-th of the effects that are named, best first: that effect, its aliases, and rejected
+/// The competing explanations of the `k`-th selected effect, best first: that effect, its aliases, and rejected
 /// candidates.
 fn competing_effects(
     search: &SearchState<'_>,
-    all_named: &[usize],
     k: usize,
     gains: &[Gain],
     variance: f64,
     aliases: &[Alias],
 ) -> Vec<CompetingEffect> {
-    let selected = all_named[k];
+    let selected = search.selected()[k].candidate;
     let named = search.effect(selected).id();
     let alias_ids: HashSet<String> = aliases.iter().map(|alias| search.effect(alias.candidate).id()).collect();
+    let others: Vec<usize> = search.selected().iter().map(|t| t.candidate).collect();
     let mut ranked: Vec<(f64, usize)> = gains
         .iter()
         .enumerate()
         .filter(|(candidate, gain)| {
             gain.freedom > 0
-                && (*candidate == selected || !all_named.contains(candidate))
+                && (*candidate == selected || !others.contains(candidate))
                 && !search.candidates[*candidate].last_resort
                 && search.may_be_added(*candidate, &search.selection.branches[ALL].folds)
         })
@@ -129,77 +118,78 @@ fn competing_effects(
     competing_effects
 }
 
-/// The explanations of the `k`-th of the effects that are named, beside the other ones. The effect that the search has
-/// selected in its place is always among them.
-pub(super) fn explanations(
+/// The aliases of the `k`-th selected effect, the most probable first, and its competing explanations. `model` is the model
+/// without that effect.
+pub(super) fn aliases(
     search: &SearchState<'_>,
-    all_named: &[usize],
     k: usize,
+    model: &TrainedModel<'_>,
     variance: f64,
-) -> Result<Explanations, Diagnostic> {
-    let (own, found) = (all_named[k], search.selected()[k].candidate);
-    let beside: Vec<usize> = all_named.iter().copied().filter(|named| *named != own).collect();
-    let model = &search.model_of(&beside, &search.selection.branches[ALL].folds)?;
-    let of_named = model.gain(own)?;
-    let least = search.evidence_for(own, &of_named, variance) - INDISTINGUISHABLE;
+) -> Result<(Vec<Alias>, Vec<CompetingEffect>), Diagnostic> {
+    let selected = &search.selected()[k];
+    let of_named = model.gain(selected.candidate)?;
+    let least = search.evidence_for(selected.candidate, &of_named, variance) - INDISTINGUISHABLE;
     let least_unpriced = search.evidence(&of_named, variance) - INDISTINGUISHABLE;
     // A staircase that the found effect approximates in a shorter description is an alias without its penalty.
-    let has_positions = search.candidates[own].selection_penalty > 0.0;
+    let has_positions = search.candidates[selected.candidate].selection_penalty > 0.0;
     let numbers = |candidate: usize| search.gram.numbers(candidate);
     let least_gain = |candidate: usize| {
-        let more = numbers(candidate).saturating_sub(numbers(own)) as f64;
+        let more = numbers(candidate).saturating_sub(numbers(selected.candidate)) as f64;
         of_named.gain / variance + 2.0 * INDISTINGUISHABLE * (more - 1.0)
     };
     let columns = |candidate: usize| search.gram.count(candidate);
     // A harmonic has two columns because its phase is estimated. It still counts as an alias of an effect with one
     // column.
     let no_more_said = |candidate: usize| {
-        columns(candidate) <= columns(own) || matches!(search.effect(candidate).shape, Shape::Harmonic { .. })
+        columns(candidate) <= columns(selected.candidate)
+            || matches!(search.effect(candidate).shape, Shape::Harmonic { .. })
     };
-    let (_, signature) = model.with_candidate(own)?;
+    let (_, signature) = model.with_candidate(selected.candidate)?;
+    let others: Vec<usize> = search.selected().iter().map(|t| t.candidate).collect();
     let gains = search.gains(model)?;
     let near: Vec<(usize, f64)> = gains
         .iter()
         .enumerate()
         .filter(|(candidate, gain)| {
-            !all_named.contains(candidate)
+            !others.contains(candidate)
                 && !search.candidates[*candidate].last_resort
                 && search.may_be_added(*candidate, &model.folds)
                 && gain.freedom > 0
                 && !search.is_beyond_library(search.effect(*candidate))
-                && (*candidate == found
-                    || search.evidence_for(*candidate, gain, variance) >= least
+                && (search.evidence_for(*candidate, gain, variance) >= least
                     || !has_positions && search.evidence(gain, variance) >= least_unpriced
                     || no_more_said(*candidate) && gain.gain / variance >= least_gain(*candidate))
         })
         .map(|(candidate, gain)| (candidate, gain.gain))
         .collect();
-    // The description length of the search, and a tuned number counts as much as in the comparison above.
+    // The costs of the search, and a tuned number counts as much as in the comparison above.
     let cost = |candidate: usize| {
-        let description = search.candidates[candidate].description_length();
-        prior_cost(search.effect(candidate)) + description + INDISTINGUISHABLE * numbers(candidate) as f64
+        let description = search.candidates[candidate].cost + INDISTINGUISHABLE * numbers(candidate) as f64;
+        prior_cost(search.effect(candidate)) + description
     };
     let mut aliases: Vec<Alias> = Vec::new();
     for (candidate, gain) in near {
-        let cosine = model.explained_by_signature(candidate, own, &signature)?.sqrt();
-        if cosine >= MIN_COSINE || candidate == found {
+        let cosine = model.explained_by_signature(candidate, selected.candidate, &signature)?.sqrt();
+        if cosine >= MIN_COSINE {
             let delta_chi2 = (of_named.gain - gain) / variance;
-            let prior_cost = cost(candidate) - cost(own);
+            let prior_cost = cost(candidate) - cost(selected.candidate);
             aliases.push(Alias { candidate, cosine, delta_chi2, prior_cost, variant_of: None });
         }
     }
     aliases.sort_by(|a, b| {
-        (b.ln_probability_ratio().total_cmp(&a.ln_probability_ratio()))
+        rounded(b.ln_probability_ratio(), DECIMALS_OF_LN)
+            .total_cmp(&rounded(a.ln_probability_ratio(), DECIMALS_OF_LN))
             .then_with(|| rounded(b.cosine, DECIMALS_OF_COSINE).total_cmp(&rounded(a.cosine, DECIMALS_OF_COSINE)))
             .then_with(|| simplest_first(search, a.candidate, b.candidate))
     });
     // The most probable candidate represents all candidates with its identifier. Candidates with the found effect's own
     // identifier are excluded.
-    let mut ids = HashSet::from([search.effect(own).id()]);
+    let named = search.effect(selected.candidate).id();
+    let mut ids = HashSet::from([named]);
     aliases.retain(|alias| ids.insert(search.effect(alias.candidate).id()));
-    mark_variants(search, own, model, variance, &mut aliases)?;
-    let competing = competing_effects(search, all_named, k, &gains, variance, &aliases);
-    Ok(Explanations { aliases, competing, gain: of_named.gain })
+    mark_variants(search, selected.candidate, model, variance, &mut aliases)?;
+    let competing_effects = competing_effects(search, k, &gains, variance, &aliases);
+    Ok((aliases, competing_effects))
 }
 
 /// Marks the aliases that are variants of the found effect, or of an alias before them. Of one explanation the simplest

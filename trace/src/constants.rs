@@ -70,13 +70,9 @@ pub const MIN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Rms difference of the fitted readings, in standard deviations of the noise, below which two shapes of one component over
 /// one driver are one explanation.
 pub const SAME_READINGS: f64 = 0.1;
-/// `ln` of the probability ratio up to which two explanations are equally probable. Tuned numbers end within their steps, which
-/// changes χ² by less than 0.1.
-pub const EQUALLY_PROBABLE: f64 = 0.05;
-/// Number of aliases of an effect, the most probable first, beside which those of another are compared as pairs.
-pub const PAIRED: usize = 8;
-/// Maximum number of exchanges of named effects for more probable ones. Each raises the probability, so that they end.
-pub const MAX_EXCHANGES: usize = 24;
+/// `ln` of the probability ratio above which an alias takes the place of the found effect: 3, below which evidence is "barely
+/// worth mentioning" (H. Jeffreys, *Theory of Probability*, 1961, App. B) and another repeat names another effect.
+pub const MORE_PROBABLE: f64 = 1.1;
 /// Maximum number of competing explanations of a found effect.
 pub const MAX_COMPETING: usize = 16;
 

@@ -46,7 +46,11 @@ impl RefittedModel {
         // Noise, outliers and rank are determined anew, as in a fit of a session that declares these effects. The
         // residual of the declared model contains the effects and overstates the noise.
         let estimated: Vec<Effect> = effects.iter().cloned().map(Effect::with_estimated_numbers).collect();
-        let (after, after_fit) = fitted(problem, &estimated, options.seed)?;
+        let (mut after, mut after_fit) = prepare_with(&problem.session, &estimated, options.seed)?;
+        if noise_is_from_search(&problem.noise, &after.noise) {
+            after.noise = problem.noise.clone();
+            after_fit = refit(&mut after, &after_fit)?;
+        }
         let structure = structure_before
             .map(|_| structure(&after, &after_fit, options, options.seed.wrapping_add(1), &|| search.should_continue()))
             .transpose()?;
@@ -71,16 +75,6 @@ impl RefittedModel {
     }
 }
 
-/// The fit of the session of a problem with effects, by the noise of the search where that is not the noise of a fit.
-pub(super) fn fitted(problem: &Problem, effects: &[Effect], seed: u64) -> Result<(Problem, Fit), Diagnostic> {
-    let (mut after, mut after_fit) = prepare_with(&problem.session, effects, seed)?;
-    if noise_is_from_search(&problem.noise, &after.noise) {
-        after.noise = problem.noise.clone();
-        after_fit = refit(&mut after, &after_fit)?;
-    }
-    Ok((after, after_fit))
-}
-
 /// The effects that a search has selected, in its order.
 fn selected_effects<'s>(search: &'s SearchState<'_>) -> impl Iterator<Item = &'s Effect> {
     let selected = search.selected().iter();
@@ -93,7 +87,7 @@ const SAME_NOISE: f64 = 0.1;
 
 /// Whether the noise of the search is not that of a fit: repeats contradict the stated noise, or beside waves that vary from
 /// run to run they give another standard deviation.
-fn noise_is_from_search(of_search: &Noise, of_fit: &Noise) -> bool {
+pub(super) fn noise_is_from_search(of_search: &Noise, of_fit: &Noise) -> bool {
     let of_one_size = (of_search.sigma_mm / of_fit.sigma_mm - 1.0).abs() < SAME_NOISE;
     match (of_search.source, of_fit.source) {
         (NoiseSource::Repeats, NoiseSource::Repeats) if !of_fit.ar_coefficients.is_empty() => false,

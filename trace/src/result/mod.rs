@@ -3,14 +3,13 @@
 mod build;
 mod curve;
 mod effect;
-mod naming;
 mod poses;
 mod prediction;
 mod rejected;
 mod reported;
 mod verdict;
 
-use abbe_identify::fit::{self, Fit, JudgedBy};
+use abbe_identify::fit::{self, Fit, JudgedBy, prepare_with};
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{Estimate, ParameterChange};
 use abbe_model::Diagnostic;
@@ -21,12 +20,13 @@ use faer::prelude::Solve;
 use faer::{Mat, Side};
 
 use super::TraceOutcome;
-use super::alias::{Alias, CompetingEffect, Explanations};
-use super::judge::{fitted, with_noise_of_fit};
+use super::alias::{self, Alias, CompetingEffect};
+use super::judge::{noise_is_from_search, with_noise_of_fit};
 use super::remainder::Structure;
 use super::state::{ALL, SearchState};
 use crate::candidates::gain::Projected;
 use crate::candidates::library;
+use crate::constants::MORE_PROBABLE;
 pub(super) use build::unsearched;
 use build::{Model, Searched, Statements, build};
 pub use effect::effect_name;
@@ -85,17 +85,33 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Dia
     let (declared, declared_fit) = of_fit.as_ref().map_or((*before, *before_fit), |(problem, fit)| (problem, fit));
     let declared = Model::of(declared, declared_fit, false, by_last)?;
     let held_out = HeldOut::of(search, declared.figures.fit.heldout_rms_um);
-    let (named, all) = naming::named(findings, residual_variance(findings))?;
     let mut alias_effects: Vec<Vec<Effect>> = Vec::new();
     let mut competing_effects = Vec::new();
     let mut gains = Vec::new();
+    let mut chosen_candidates = Vec::new();
     let mut predicted = Vec::new();
     let mut costs = Vec::new();
     let (mut covered, mut variants) = (Vec::new(), Vec::new());
-    for (k, Explanations { mut aliases, competing, gain }) in all.into_iter().enumerate() {
-        let mut of_tests = prediction::predictions(findings, &named, k, &mut aliases)?;
-        competing_effects.push(competing);
-        gains.push(gain);
+    let variance = residual_variance(findings);
+    let folds = &search.selection.branches[ALL].folds;
+    for (k, taken) in search.selected().iter().enumerate() {
+        // Beside the explanations that are named of the effects before it.
+        let before_it = chosen_candidates.iter().map(|(candidate, _)| *candidate);
+        let after_it = search.selected()[k + 1..].iter().map(|selected| selected.candidate);
+        let model = search.model_of(&before_it.chain(after_it).collect::<Vec<_>>(), folds)?;
+        let (mut aliases, of_effect) = alias::aliases(search, k, &model, variance)?;
+        let mut of_tests = prediction::predictions(findings, k, &mut aliases)?;
+        competing_effects.push(of_effect);
+        let assumed = assumed(findings, taken.candidate, &aliases);
+        let place = assumed.unwrap_or_else(|| most_probable(search, taken.candidate, &aliases, &of_tests));
+        let found = place.map_or(taken.candidate, |place| exchange(taken.candidate, place, &mut aliases));
+        match (place, assumed) {
+            // The left-out tests were predicted with the other effect in the model.
+            (Some(_), Some(_)) => of_tests = prediction::Predictions::none(&aliases),
+            (Some(place), None) => of_tests.exchange(place),
+            (None, _) => {}
+        }
+        chosen_candidates.push((found, assumed.is_some()));
         let effect_of = |alias: &Alias| search.effect(alias.candidate).clone();
         // Uncertainties cover variants too.
         covered.push(aliases.iter().map(effect_of).collect::<Vec<Effect>>());
@@ -108,20 +124,21 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Dia
         let variants_of = |head: usize| -> Vec<Effect> {
             aliases.iter().filter(|alias| alias.variant_of == Some(head)).map(effect_of).collect()
         };
-        let each = std::iter::once(named.candidates[k]).chain(heads.iter().map(|alias| alias.candidate));
+        let each = std::iter::once(found).chain(heads.iter().map(|alias| alias.candidate));
         variants.push(each.map(variants_of).collect::<Vec<_>>());
+        gains.push(model.gain(taken.candidate)?.gain);
     }
-    let mut kept: Vec<usize> = (0..named.candidates.len()).collect();
+    let mut kept: Vec<usize> = (0..chosen_candidates.len()).collect();
     let (mut after, mut after_fit) = match kept.is_empty() {
         true => (declared.problem.clone(), declared.fit.clone()),
-        false => with_aliases(findings, &named, &covered, &kept)?,
+        false => with_aliases(findings, &chosen_candidates, &covered, &kept)?,
     };
     // An explanation that takes the place of an effect may leave nothing to another one.
     let explains = |k: &usize| explained(&after, &after_fit, before.parameters.effects.len() + k) > EXPLAINS_NOTHING;
     let explaining: Vec<usize> = kept.iter().copied().filter(explains).collect();
     if explaining.len() < kept.len() {
         kept = explaining;
-        (after, after_fit) = with_aliases(findings, &named, &covered, &kept)?;
+        (after, after_fit) = with_aliases(findings, &chosen_candidates, &covered, &kept)?;
         let mut place = 0..;
         alias_effects.retain(|_| place.next().is_some_and(|k| kept.contains(&k)));
         let mut place = 0..;
@@ -137,7 +154,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Dia
         let reported = effect::Found {
             number,
             selected: k,
-            candidate: named.candidates[k],
+            candidate: chosen_candidates[k].0,
             after,
             after_fit,
             parameters: &found.figures.parameters,
@@ -285,35 +302,91 @@ fn not_assumed(findings: &TraceFindings<'_>, after: &Problem) -> Vec<String> {
     open.map(|id| format!("\"{id}\" is not assumed: no effect that was found is explained by it")).collect()
 }
 
-/// The model with the named effects, which now have their aliases: uncertainties cover these, unless the effect is
-/// assumed. Those that are `kept` are in the model.
+/// Whether the user accepts an explanation of an effect, and its place among the aliases if it is not the found effect.
+fn assumed(findings: &TraceFindings<'_>, found: usize, aliases: &[Alias]) -> Option<Option<usize>> {
+    let is_assumed = |candidate: usize| findings.assume.contains(&findings.search.effect(candidate).id());
+    if is_assumed(found) {
+        return Some(None);
+    }
+    aliases.iter().position(|alias| is_assumed(alias.candidate)).map(Some)
+}
+
+/// The place of the alias that is more probable than the found effect, and that predicts left-out tests no worse. A staircase
+/// takes no place of a shape with fewer steps: with enough steps it approximates any shape.
+fn most_probable(
+    search: &SearchState<'_>,
+    found: usize,
+    aliases: &[Alias],
+    of_tests: &prediction::Predictions,
+) -> Option<usize> {
+    let ratio = |place: &usize| aliases[*place].ln_probability_ratio();
+    let steps = |candidate: usize| search.effect(candidate).shape.positions().len();
+    (0..aliases.len())
+        .filter(|place| steps(aliases[*place].candidate) <= steps(found).max(1))
+        .filter(|place| aliases[*place].variant_of.is_none() && ratio(place) > MORE_PROBABLE)
+        .filter(|place| !of_tests.is_worse(*place))
+        .max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
+}
+
+/// Names the alias at a place in place of the found effect, which becomes the first of the aliases. Returns its candidate.
+fn exchange(found: usize, place: usize, aliases: &mut Vec<Alias>) -> usize {
+    let chosen = aliases.remove(place);
+    let is_variant = chosen.variant_of == Some(found);
+    for alias in aliases.iter_mut() {
+        alias.delta_chi2 -= chosen.delta_chi2;
+        alias.prior_cost -= chosen.prior_cost;
+        if is_variant && alias.variant_of == Some(found) {
+            alias.variant_of = Some(chosen.candidate);
+        }
+    }
+    let replaced = Alias {
+        candidate: found,
+        delta_chi2: -chosen.delta_chi2,
+        prior_cost: -chosen.prior_cost,
+        variant_of: is_variant.then_some(chosen.candidate),
+        ..chosen
+    };
+    aliases.insert(0, replaced);
+    chosen.candidate
+}
+
+/// The model with the found effects, which now have their aliases: uncertainties cover these, unless the effect is
+/// assumed. `chosen` is the candidate of each effect, and whether the user accepts it; those that are `kept` are in the model.
 ///
 /// # Errors
-/// If an alias cannot be evaluated, or the model cannot be fitted.
+/// If an alias cannot be evaluated, or the model with an accepted alias cannot be fitted.
 fn with_aliases(
     findings: &TraceFindings<'_>,
-    named: &naming::Named,
+    chosen: &[(usize, bool)],
     alias_effects: &[Vec<Effect>],
     kept: &[usize],
 ) -> Result<(Problem, Fit), Diagnostic> {
+    let search = findings.search;
     let effects: Vec<Effect> = (kept.iter())
         .map(|k| Effect {
             aliases: alias_effects[*k].clone(),
-            assumed: named.assumed[*k],
-            ..findings.search.effect(named.candidates[*k]).clone().with_estimated_numbers()
+            assumed: chosen[*k].1,
+            ..search.effect(chosen[*k].0).clone().with_estimated_numbers()
         })
         .collect();
-    if kept.len() < named.candidates.len() {
-        return fitted(findings.before, &effects, findings.seed);
+    let as_found = kept.len() == search.selected().len()
+        && search.selected().iter().zip(chosen).all(|(found, chosen)| found.candidate == chosen.0);
+    if !as_found {
+        let (mut after, mut fitted) = prepare_with(&findings.before.session, &effects, findings.seed)?;
+        if noise_is_from_search(&findings.before.noise, &after.noise) {
+            after.noise = findings.before.noise.clone();
+            fitted = fit::refit(&mut after, &fitted)?;
+        }
+        return Ok((after, fitted));
     }
-    let (mut after, mut after_fit) = (named.after.clone(), named.after_fit.clone());
+    let (mut after, mut fitted) = (findings.after.clone(), findings.after_fit.clone());
     let declared = findings.before.parameters.effects.len();
     for (own, found) in after.parameters.effects[declared..].iter_mut().zip(effects) {
         // The numbers of its shape have been estimated.
         *own = Effect { shape: own.shape.clone(), ..found };
     }
-    after_fit.aliases = fit::aliases_at_solution(&after, &after_fit.beta)?;
-    Ok((after, after_fit))
+    fitted.aliases = fit::aliases_at_solution(&after, &fitted.beta)?;
+    Ok((after, fitted))
 }
 
 /// What an effect explains in addition to the rest of the model: the increase of χ² of readings and priors without it,
@@ -348,8 +421,6 @@ fn changed_parameters(before: &[Estimate], after: &[Estimate]) -> Vec<ParameterC
 
 #[cfg(test)]
 mod tests {
-    use abbe_identify::fit::prepare_with;
-
     use super::*;
 
     #[test]

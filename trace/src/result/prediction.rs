@@ -8,9 +8,9 @@
 use abbe_identify::heldout::{LeftOutTests, left_out_tests};
 use abbe_identify::problem::Problem;
 use abbe_model::Diagnostic;
+use abbe_model::effect::Effect;
 
 use super::TraceFindings;
-use super::naming::Named;
 use crate::alias::Alias;
 use crate::constants::{INDISTINGUISHABLE, MAX_PREDICTING};
 
@@ -32,50 +32,45 @@ impl Predictions {
         self.aliases_um.retain(|_| place.next().is_some_and(&is_kept));
     }
 
+    /// Whether an alias predicts worse than the found effect, by its place.
+    pub fn is_worse(&self, place: usize) -> bool {
+        let of_alias = self.aliases_um.get(place).copied().flatten();
+        of_alias.zip(self.found_um).is_some_and(|(alias, found)| alias > WORSE * found)
+    }
+
+    /// Exchanges the found effect for an alias: it becomes the first alias.
+    pub fn exchange(&mut self, place: usize) {
+        if place < self.aliases_um.len() {
+            let of_alias = self.aliases_um.remove(place);
+            self.aliases_um.insert(0, self.found_um);
+            self.found_um = of_alias;
+        }
+    }
+
     /// Of no test.
-    fn none(aliases: &[Alias]) -> Predictions {
+    pub fn none(aliases: &[Alias]) -> Predictions {
         Predictions { found_um: None, aliases_um: vec![None; aliases.len()] }
     }
 }
 
-/// The left-out tests as the named effects predict them, and their rms, mm. `None` if no test can be left out.
-fn left_out(Named { after, after_fit, .. }: &Named) -> Result<Option<(LeftOutTests, f64)>, Diagnostic> {
-    if after.models.len() < 2 {
-        return Ok(None);
-    }
-    let found = left_out_tests(after, &after_fit.beta)?;
-    Ok(found.rms_mm(after).map(|rms_mm| (found, rms_mm)))
-}
-
-/// Whether other candidates in place of some named effects predict the left-out tests worse.
-pub(super) fn predicts_worse(
-    findings: &TraceFindings<'_>,
-    named: &Named,
-    exchange: &[(usize, usize)],
-) -> Result<bool, Diagnostic> {
-    let Some((found, found_mm)) = left_out(named)? else { return Ok(false) };
-    let predicted = predicted_mm(findings, named, exchange, &found)?;
-    Ok(predicted.is_some_and(|mm| mm > WORSE * found_mm))
-}
-
-/// Predicts the left-out tests with the `k`-th named effect and with each of its aliases. Sorts the aliases: those that
+/// Predicts the left-out tests with the `k`-th found effect and with each of its aliases. Sorts the aliases: those that
 /// predict better come first, otherwise the order remains.
 pub(super) fn predictions(
     findings: &TraceFindings<'_>,
-    named: &Named,
     k: usize,
     aliases: &mut Vec<Alias>,
 ) -> Result<Predictions, Diagnostic> {
     let none = Predictions::none(aliases);
-    if aliases.is_empty() {
+    if aliases.is_empty() || findings.after.models.len() < 2 {
         return Ok(none);
     }
-    let Some((found, found_mm)) = left_out(named)? else { return Ok(none) };
-    let judged = scalars(&named.after, &found) / named.after.noise.sigma_mm.powi(2);
+    let found = left_out_tests(findings.after, &findings.after_fit.beta)?;
+    let Some(found_mm) = found.rms_mm(findings.after) else { return Ok(none) };
+    let judged = scalars(findings.after, &found) / findings.after.noise.sigma_mm.powi(2);
     let mut ranked = Vec::with_capacity(aliases.len());
     for (place, alias) in aliases.drain(..).enumerate() {
         let mm = match place < MAX_PREDICTING {
-            true => predicted_mm(findings, named, &[(k, alias.candidate)], &found)?,
+            true => predicted_mm(findings, k, findings.search.effect(alias.candidate), &found)?,
             false => None,
         };
         // Twice the difference of the log-likelihoods; it counts in whole margins.
@@ -97,29 +92,28 @@ fn scalars(problem: &Problem, left_out: &LeftOutTests) -> f64 {
     judged.map(|(test, _)| problem.scalars_of(test)).sum::<usize>() as f64
 }
 
-/// Rms of the tests that the model with the named effects predicts, mm, with other candidates in place of some of them.
-/// `None` if the other tests do not identify these for each of them.
+/// Rms of the tests that the model with the found effect predicts, mm, with an alias in place of the `k`-th effect.
+/// `None` if the other tests do not identify the alias for each of them.
 fn predicted_mm(
     findings: &TraceFindings<'_>,
-    Named { after, after_fit, .. }: &Named,
-    exchange: &[(usize, usize)],
+    k: usize,
+    alias: &Effect,
     found: &LeftOutTests,
 ) -> Result<Option<f64>, Diagnostic> {
-    let before = findings.before;
+    let (before, after) = (findings.before, findings.after);
     let mut problem = before.clone();
     problem.noise = after.noise.clone();
     problem.rejected = after.rejected.clone();
     // The parameters of the declared model come first, then those of the found effects in their order.
-    let mut beta = after_fit.beta[..before.parameters.list.len()].to_vec();
+    let mut beta = findings.after_fit.beta[..before.parameters.list.len()].to_vec();
     let declared = before.parameters.effects.len();
     for (number, effect) in after.parameters.effects.iter().enumerate().skip(declared) {
-        if let Some((_, candidate)) = exchange.iter().find(|(k, _)| number == declared + k) {
-            let alias = findings.search.effect(*candidate);
+        if number == declared + k {
             problem.add_effect(alias)?;
             beta.resize(beta.len() + alias.shape.coefficients(), 0.0);
         } else {
             problem.add_effect(&effect.alone())?;
-            let own = after.parameters.list.iter().zip(&after_fit.beta);
+            let own = after.parameters.list.iter().zip(&findings.after_fit.beta);
             let own = own.filter(|(parameter, _)| parameter.coefficient_of() == Some(number));
             beta.extend(own.map(|(_, value)| value));
         }
