@@ -145,7 +145,8 @@ impl Unit {
     /// The unit of a word of another program, such as `Zoll` or `[°C]` without its brackets. `grad` is [`Unit::Grad`].
     pub fn of_word(word: &str) -> Option<Unit> {
         let word = word.trim().to_lowercase();
-        Unit::ALL.iter().find(|unit| unit.words().split_whitespace().any(|own| own == word)).copied()
+        let has_word = |unit: &&Unit| !word.is_empty() && unit.words().split_whitespace().any(|own| own == word);
+        Unit::ALL.iter().find(has_word).copied()
     }
 
     /// The size in the internal unit of its dimension.

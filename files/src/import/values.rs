@@ -132,7 +132,7 @@ fn number_of(grid: &Grid, one: &Found, line: usize, cell: &str, needs: &mut Need
             help.into(),
         ))
     };
-    let Some(unit) = Unit::of_word(word).filter(|_| !word.is_empty()) else {
+    let Some(unit) = Unit::of_word(word) else {
         return if one.has_unit_in_cells {
             fault("has no unit, and other numbers of the column have one".into())
         } else {
