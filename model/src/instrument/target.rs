@@ -36,6 +36,7 @@ impl<N> Target<N> {
 
 impl<N: Nominal> Target<N> {
     /// In its frame, displaced by three parameters from the first on, if they are included.
+    #[inline]
     pub fn displaced<S: Scalar<Nominal = N>>(&self, first: usize, unknown: &impl Fn(usize) -> Option<S>) -> Point<S> {
         Point(std::array::from_fn(|i| match unknown(first + i) {
             Some(displacement) => displacement + self.mm[i],
@@ -44,6 +45,7 @@ impl<N: Nominal> Target<N> {
     }
 
     /// In R, displaced as by [`Target::displaced`].
+    #[inline]
     pub fn in_r<S: Scalar<Nominal = N>>(
         &self,
         at: MachineState<'_, S>,
