@@ -98,7 +98,8 @@ fn a_ball_on_the_tilting_axis_is_not_carried_by_the_table() {
         let truth: Vec<_> = ERRORS.iter().map(|(id, size)| (*id, uniform(&mut random, *size))).collect();
         let text = measured(&folder, &truth, &mut random);
         of_errors.iter_mut().zip(pulls(&folder.session(&text), &truth)).for_each(|(all, pull)| all.push(pull));
-        let text = text.replace("workpiece_ball_frame = \"axis A\"\n", "");
+        // On the table the ball would turn with C, and could not be reached.
+        let text = text.replace("workpiece_ball_frame = \"axis A\"\n", "").replace("c_deg = 40, ", "");
         on_table = pulls(&folder.session(&text), &truth).into_iter().fold(on_table, |most, pull| most.max(pull.abs()));
     }
     for (pulls, (id, _)) in of_errors.iter().zip(ERRORS) {
