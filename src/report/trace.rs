@@ -69,6 +69,9 @@ pub fn report(
         let covers = "u covers the change of the parameter if an alias takes the place of an effect";
         report.key(Text::Note(covers.to_string()));
     }
+    for presumed in presumed_by_explanations(result) {
+        report.key(Text::Note(format!("{presumed}, which no reading separates from them")));
+    }
     let changed = Text::List(changes(result));
     let heading =
         "Changed by more than their standard uncertainty when the effects were added (bias of the declared model):";
@@ -81,10 +84,8 @@ pub fn report(
     report.key(before_and_after(result));
     conformity::section(&mut report, result.conformity.as_ref());
     confounded::section(&mut report, &result.after);
-    for (level, presumed) in [Level::Key, Level::Detail].into_iter().zip(presumed(result)) {
-        let rest = "Location errors that rest on the absence of a motion, which no reading separates from them:";
-        report.headed(level, rest, Text::List(presumed));
-    }
+    let rest = "Location errors that rest on the absence of a motion, which no reading separates from them:";
+    report.headed(Level::Detail, rest, Text::List(result.presumed.clone()));
     report.section("Next");
     report.headed(Level::Key, "Tests that separate an effect from its aliases:", Text::List(measure_next(result)));
     let page = "write residuals, plots and alternatives as a page";
@@ -107,17 +108,15 @@ pub fn report(
     Ok(report)
 }
 
-/// What location errors presume: first of the axes that precess by an explanation of the readings, then of the others.
-fn presumed(result: &TraceResult) -> [Vec<String>; 2] {
+/// What the location errors of axes that precess by an explanation of the readings presume.
+fn presumed_by_explanations(result: &TraceResult) -> impl Iterator<Item = &String> {
     let explanations = result.effects.iter().flat_map(|effect| {
         let of_aliases = effect.aliases.iter().flat_map(|alias| std::iter::once(&alias.name).chain(&alias.variants));
         std::iter::once(&effect.name).chain(&effect.variants).chain(of_aliases)
     });
     let precessing = explanations.filter(|name| name.shape == "precession");
     let motions: Vec<String> = precessing.map(|name| format!(" {}~{}:", name.component, name.driver)).collect();
-    let is_of_one = |presumed: &String| motions.iter().any(|motion| presumed.contains(motion));
-    let (of_one, others) = result.presumed.iter().cloned().partition(is_of_one);
-    [of_one, others]
+    result.presumed.iter().filter(move |presumed| motions.iter().any(|motion| presumed.contains(motion)))
 }
 
 fn method(result: &TraceResult) -> String {
