@@ -13,6 +13,7 @@ use abbe_plan::results::{Contribution, PlanAnalysis};
 use abbe_trace::result::TraceResult;
 use abbe_trace::validate::{MovedParameter, ValidationResult, ValidationStatement};
 use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -209,6 +210,38 @@ fn rename(value: &mut Value, unit: Option<&str>) {
             }
         }
         Value::Array(items) => items.iter_mut().for_each(|value| rename(value, unit)),
+        _ => {}
+    }
+}
+
+/// The schema of a type.
+pub(crate) fn open<T: JsonSchema>() -> Value {
+    let generator = SchemaSettings::draft2020_12().for_serialize().into_generator();
+    generator.into_root_schema_for::<T>().to_value()
+}
+
+/// The schema of a command's document.
+pub fn of<T: JsonSchema + 'static>() -> Value {
+    let (mut schema, result) = (open::<Document<T>>(), open::<T>());
+    for key in ["title", "description"] {
+        schema[key] = result[key].clone();
+    }
+    close(&mut schema);
+    schema
+}
+
+/// A result has the fields that are described and no others, so that a program may rely on both.
+pub(crate) fn close(schema: &mut Value) {
+    match schema {
+        Value::Object(entries) => {
+            if entries.get("properties").is_some_and(Value::is_object)
+                && entries.get("type") == Some(&Value::from("object"))
+            {
+                entries.entry("additionalProperties").or_insert(Value::Bool(false));
+            }
+            entries.values_mut().for_each(close);
+        }
+        Value::Array(items) => items.iter_mut().for_each(close),
         _ => {}
     }
 }

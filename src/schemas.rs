@@ -13,12 +13,11 @@ use abbe_plan::global::GlobalAnalysis;
 use abbe_plan::next::NextTest;
 use abbe_plan::poses::PoseSelection;
 use schemars::JsonSchema;
-use schemars::generate::SchemaSettings;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use crate::analysis::{ANALYSES, Line};
 use crate::certificate::Certificate;
-use crate::document::{Document, StatedHistory};
+use crate::document::{StatedHistory, close, of, open};
 use crate::exports::ExportResult;
 use crate::fleet::record::Record;
 use crate::fleet::run::RunResult;
@@ -81,34 +80,4 @@ fn plain<T: JsonSchema>() -> Value {
     close(&mut schema);
     schema::share(&mut schema);
     schema
-}
-
-fn open<T: JsonSchema>() -> Value {
-    let generator = SchemaSettings::draft2020_12().for_serialize().into_generator();
-    generator.into_root_schema_for::<T>().to_value()
-}
-
-/// The schema of a command's document.
-pub fn of<T: JsonSchema + 'static>() -> Value {
-    let (mut schema, result) = (open::<Document<T>>(), open::<T>());
-    for key in ["title", "description"] {
-        schema[key] = result[key].clone();
-    }
-    close(&mut schema);
-    schema
-}
-
-/// A result has the fields that are described and no others, so that a program may rely on both.
-fn close(schema: &mut Value) {
-    match schema {
-        Value::Object(entries) => {
-            if entries.get("properties").is_some_and(Value::is_object) && entries.get("type") == Some(&json!("object"))
-            {
-                entries.entry("additionalProperties").or_insert(Value::Bool(false));
-            }
-            entries.values_mut().for_each(close);
-        }
-        Value::Array(items) => items.iter_mut().for_each(close),
-        _ => {}
-    }
 }

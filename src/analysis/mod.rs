@@ -171,7 +171,7 @@ const fn line<A: Analysis>() -> Line {
         name: A::NAME,
         command: A::COMMAND,
         #[cfg(feature = "fleet")]
-        schema: crate::schemas::of::<A::Result>,
+        schema: crate::document::of::<A::Result>,
         #[cfg(feature = "command")]
         arguments: <A::Options as clap::Args>::augment_args,
         #[cfg(feature = "command")]

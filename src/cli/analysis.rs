@@ -3,16 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use abbe::analysis::{ANALYSES, Command, Given, Kind, Line};
-use abbe::files::stamp::FileStamp;
-use abbe::files::{self, ReadOptions, SourceMap};
-use abbe::identify::model_file::{self, IdentifiedModel};
+use abbe::files::{self, ReadOptions};
+use abbe::identify::model_file;
 use abbe::model::Diagnostic;
-use abbe::model::session::Session;
 use clap::{Arg, ArgMatches, Args, FromArgMatches, value_parser};
 
 use super::failure::command_line;
 use super::output::Outputs;
-use super::results::Read;
+use super::results::{File, Read};
 use super::{CommonArguments, DataArguments};
 
 /// What every such command takes beside its files and its options.
@@ -65,14 +63,6 @@ pub fn run(line: &Line, command: &Command, matches: &ArgMatches) -> Result<(), D
     let session = paths.iter().find(|(kind, _)| matches!(kind, Kind::Session)).map_or(Path::new(""), |(_, path)| path);
     let commands = data.commands(session).made_by(line.name, &stated);
     common.output.put_found(&outputs, &*found, &commands, &Read::inputs(&inputs, common.seed))
-}
-
-/// A file that is analysed, with what it was read from.
-pub enum File {
-    /// A session.
-    Session(Box<(Session, SourceMap)>),
-    /// A saved model.
-    Model(Box<IdentifiedModel>, Option<FileStamp>),
 }
 
 impl File {

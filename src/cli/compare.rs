@@ -6,9 +6,8 @@ use abbe::analysis::{Analysis, Compared, ComparisonOptions, Given};
 use abbe::model::Diagnostic;
 use clap::Args;
 
-use super::analysis::File;
 use super::failure::command_line;
-use super::results::Read;
+use super::results::{File, Read};
 use super::{CommonArguments, DataArguments, Global, repeated};
 
 /// Examples of `abbe compare`.

@@ -6,13 +6,13 @@ use abbe::analysis::Found;
 use abbe::document::{self, Document, Origin};
 use abbe::files::SourceMap;
 use abbe::files::stamp::FileStamp;
+use abbe::identify::model_file::IdentifiedModel;
 use abbe::model::Diagnostic;
 use abbe::model::session::Session;
 use clap::Args;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::analysis::File;
 use super::failure::command_line;
 use super::folder;
 use super::json;
@@ -62,6 +62,14 @@ pub struct OutputArguments {
     /// Suppress tables and progress output; warnings and errors stay.
     #[arg(short, long, global = true)]
     pub quiet: bool,
+}
+
+/// A file that is analysed, with what it was read from.
+pub enum File {
+    /// A session.
+    Session(Box<(Session, SourceMap)>),
+    /// A saved model.
+    Model(Box<IdentifiedModel>, Option<FileStamp>),
 }
 
 /// What a result was computed from.

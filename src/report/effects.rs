@@ -6,16 +6,17 @@ use abbe::model::parameter_id::ParameterId;
 use abbe::model::words::{counted, listed, with_exponent};
 use abbe::trace::TraceOutcome;
 use abbe::trace::alias::CompetingEffect;
-use abbe::trace::result::{AliasResult, EffectName, EffectResult, SeparatingTestResult, ShapeParameter, TraceResult};
+use abbe::trace::result::{
+    AliasResult, EffectName, EffectResult, PriorResult, SeparatingTestResult, ShapeParameter, TraceResult,
+};
 
 use super::block::{Level, Report, Text};
 use super::figure::bars::{ALIAS, NAMED, OTHER, bars};
 use super::figure::lines::{Axis, Lines, Mark, Name, Series};
 use super::figure::scale::{Scale, span};
 use super::figure::{Figure, Quantity};
-use super::number::{integer, of_readings, p_value, quantity, shape_number, value_and_u};
+use super::number::{integer, of_readings, p_value, quantity, shape_number, unit, value_and_u};
 use super::table::{Cell, Column, Table, cells};
-use super::trace;
 
 /// Maximum number of effects that are shown unfolded.
 const MAX_OPEN: usize = 4;
@@ -42,9 +43,9 @@ pub fn section(report: &mut Report, outcome: &TraceOutcome) {
         report.figures(competing.map(|competing| ranking(competing, &id)));
     }
     report.folded("Families of effects that were searched", Text::List(result.families.clone()));
-    let rejected = Text::List(trace::rejected(result));
+    let rejected = Text::List(rejected(result));
     report.headed(Level::Key, "Rejected, because the held-out error does not decrease significantly:", rejected);
-    if let Some(remainder) = trace::remainder(result) {
+    if let Some(remainder) = remainder(result) {
         report.key(Text::Heading(format!("Remaining structure {remainder}")));
     }
     if !outcome.steps.is_empty() {
@@ -56,7 +57,7 @@ pub fn section(report: &mut Report, outcome: &TraceOutcome) {
 /// What the effect is, explains, and competes with.
 fn values(effect: &EffectResult, screened: &str, is_alone: bool) -> Table {
     let mut rows = vec![cells!["estimate", estimate(effect)]];
-    rows.extend(effect.prior.iter().map(|prior| cells!["prior", trace::prior(prior)]));
+    rows.extend(effect.prior.iter().map(|prior| cells!["prior", prior_in_words(prior)]));
     let explains = format!("{} rms ({})", of_readings(effect.rms_gain_um, effect.unit), p_value(effect.p_value));
     rows.push(cells!["explains", explains]);
     // Of a single effect it stands among the key figures.
@@ -432,5 +433,48 @@ fn sentence(test: &SeparatingTestResult, further: bool) -> String {
     format!(
         "{then}{} separates it from {aliases} in {:.0} min: by at least {after:.1} standard deviations, without the test by at most {before:.1}",
         test.test, test.duration_min
+    )
+}
+
+/// Probability below which an order of a spectrum stands out of the others.
+const OUTSTANDING: f64 = 0.05;
+
+/// Candidates that do not lower the held-out error significantly, one sentence each.
+fn rejected(result: &TraceResult) -> Vec<String> {
+    let rejected = result.rejected_candidates.iter().map(|candidate| {
+        let (decrease, u) = value_and_u(candidate.heldout_decrease_um, candidate.u_heldout_decrease_um);
+        format!(
+            "{} ({}): the held-out rms decreases by {decrease} {of}, with a standard error of {u} {of}",
+            name(&candidate.name),
+            p_value(candidate.p_value),
+            of = unit(result.reading_unit.name())
+        )
+    });
+    rejected.collect()
+}
+
+/// The structure that remains, and its significance; `None` without one.
+fn remainder(result: &TraceResult) -> Option<String> {
+    let place = result.remainder.place.as_deref().unwrap_or("");
+    result.remainder.structured.then(|| format!("({}): {place}", p_value(result.remainder.p_value)))
+}
+
+/// The prior of an effect's coefficients in words: `prior of 9.3″ for each of 80 coefficients, estimated for …`.
+fn prior_in_words(prior: &PriorResult) -> String {
+    let source = match &prior.family {
+        Some(family) => format!("estimated for the family {family}"),
+        None => "stated".to_string(),
+    };
+    let line = prior.largest_order.as_ref().map_or_else(String::new, |line| {
+        let amplitude = quantity(&format!("{:.3}", line.amplitude), &prior.unit);
+        let verdict = if line.p_value < OUTSTANDING { "stands out" } else { "does not stand out" };
+        let order = line.order;
+        format!("; order {order} has the largest amplitude, {amplitude}, and {verdict} ({})", p_value(line.p_value))
+    });
+    format!(
+        "prior standard deviation {} ({source}); the readings determine {:.1} of {}{line}",
+        quantity(&format!("{:.3}", prior.scale), &prior.unit),
+        prior.effective_parameters,
+        counted(prior.coefficients, "coefficient")
     )
 }

@@ -8,13 +8,13 @@ use abbe::model::Diagnostic;
 use abbe::model::session::Session;
 use abbe::model::words::counted;
 use abbe::trace::TraceOutcome;
-use abbe::trace::result::{EffectResult, PriorResult, TraceResult};
+use abbe::trace::result::{EffectResult, TraceResult};
 
 use super::block::{KeyFigure, Level, Report, Sentence, Text};
 use super::commands::{Commands, TRACED};
 use super::effects::name;
 use super::fit::{Figures, rank};
-use super::number::{capitalised, integer, of_readings, p_value, quantity, unit, value_and_u};
+use super::number::{capitalised, integer, of_readings, quantity, unit, value_and_u};
 use super::parameters::Estimates;
 use super::quality;
 use super::session;
@@ -289,29 +289,6 @@ pub fn before_and_after(result: &TraceResult) -> Table {
     table
 }
 
-/// Probability below which an order of a spectrum stands out of the others.
-const OUTSTANDING: f64 = 0.05;
-
-/// Candidates that do not lower the held-out error significantly, one sentence each.
-pub fn rejected(result: &TraceResult) -> Vec<String> {
-    let rejected = result.rejected_candidates.iter().map(|candidate| {
-        let (decrease, u) = value_and_u(candidate.heldout_decrease_um, candidate.u_heldout_decrease_um);
-        format!(
-            "{} ({}): the held-out rms decreases by {decrease} {of}, with a standard error of {u} {of}",
-            name(&candidate.name),
-            p_value(candidate.p_value),
-            of = unit(result.reading_unit.name())
-        )
-    });
-    rejected.collect()
-}
-
-/// The structure that remains, and its significance; `None` without one.
-pub fn remainder(result: &TraceResult) -> Option<String> {
-    let place = result.remainder.place.as_deref().unwrap_or("");
-    result.remainder.structured.then(|| format!("({}): {place}", p_value(result.remainder.p_value)))
-}
-
 /// Parameters that changed by more than their uncertainty when the effects were added.
 fn changes(result: &TraceResult) -> Vec<String> {
     let changes = result.changed_parameters.iter().map(|changed| {
@@ -319,26 +296,6 @@ fn changes(result: &TraceResult) -> Vec<String> {
         format!("{}  {} (u {u})", changed.id, quantity(&change, &changed.unit))
     });
     changes.collect()
-}
-
-/// The prior of an effect's coefficients in words: `prior of 9.3″ for each of 80 coefficients, estimated for …`.
-pub fn prior(prior: &PriorResult) -> String {
-    let source = match &prior.family {
-        Some(family) => format!("estimated for the family {family}"),
-        None => "stated".to_string(),
-    };
-    let line = prior.largest_order.as_ref().map_or_else(String::new, |line| {
-        let amplitude = quantity(&format!("{:.3}", line.amplitude), &prior.unit);
-        let verdict = if line.p_value < OUTSTANDING { "stands out" } else { "does not stand out" };
-        let order = line.order;
-        format!("; order {order} has the largest amplitude, {amplitude}, and {verdict} ({})", p_value(line.p_value))
-    });
-    format!(
-        "prior standard deviation {} ({source}); the readings determine {:.1} of {}{line}",
-        quantity(&format!("{:.3}", prior.scale), &prior.unit),
-        prior.effective_parameters,
-        counted(prior.coefficients, "coefficient")
-    )
 }
 
 /// Every figure with all its digits, one row per figure.

@@ -14,10 +14,10 @@ use abbe_model::session::readings::Readings;
 use abbe_model::unit::Unit;
 
 use super::comment::is_comment;
-use super::format::{Content, DataFormat, Rows};
+use super::format::{Content, DataFormat};
 use super::lines::Lines;
 use super::request::Request;
-use super::row::Row;
+use super::row::{Row, Rows};
 use crate::stamp::FileStamp;
 use crate::store::Store;
 

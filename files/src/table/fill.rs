@@ -14,11 +14,10 @@ use nalgebra::{Quaternion, UnitQuaternion};
 
 use super::columns::{self, Column, Role};
 use super::duplicates::{self, CellHasher};
-use super::format::Rows;
 use super::number::number;
 use super::request::{Format, Request};
 use super::required;
-use super::row::Row;
+use super::row::{Row, Rows};
 use crate::check;
 
 /// Largest number of sockets in a file.

@@ -9,7 +9,7 @@ use abbe_model::Diagnostic;
 
 use super::fill::Filling;
 use super::request::Request;
-use super::row::Row;
+use super::row::Rows;
 use crate::stamp::FileStamp;
 use crate::store::Store;
 
@@ -31,18 +31,6 @@ pub(super) enum Content {
     Table { rows: Box<dyn Rows>, has_header: bool },
     /// Readings that the format itself interprets.
     Readings(Filling),
-}
-
-/// The rows of a file, one after another. All have the same number of cells.
-pub(super) trait Rows {
-    /// The next row, or `None` at the end.
-    ///
-    /// # Errors
-    /// If the next line is not a row of the format, or beyond a limit.
-    fn next_row(&mut self) -> Result<Option<Row>, Diagnostic>;
-
-    /// Takes a row that is no longer needed, so that the next one can use its memory: a file has millions of them.
-    fn reuse(&mut self, _: Row) {}
 }
 
 /// Whether the name of a file ends in one of these extensions, in any case.

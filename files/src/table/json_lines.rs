@@ -9,10 +9,10 @@ use abbe_model::Diagnostic;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use serde_json::value::RawValue;
 
-use super::format::{Content, DataFormat, Rows, has_extension};
+use super::format::{Content, DataFormat, has_extension};
 use super::lines::Lines;
 use super::request::{ForeignColumn, Request};
-use super::row::Row;
+use super::row::{Row, Rows};
 use crate::stamp::FileStamp;
 use crate::store::Store;
 

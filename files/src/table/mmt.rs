@@ -8,11 +8,11 @@ use std::path::Path;
 use abbe_model::Diagnostic;
 use abbe_model::words::counted;
 
-use super::format::{Content, DataFormat, Rows, has_extension, starts_with};
+use super::format::{Content, DataFormat, has_extension, starts_with};
 use super::lines::{Line, Lines};
 use super::number::number;
 use super::request::{Format, Request};
-use super::row::Row;
+use super::row::{Row, Rows};
 use super::tpoint;
 use crate::stamp::FileStamp;
 use crate::store::Store;

@@ -4,7 +4,7 @@
 //!   `ballbar_xml`, `json_lines`, `tpoint`, `mmt`;
 //! - `request`: what a test requires of its file; `columns`, `required`: roles of columns; `fill`: readings
 //!   from rows;
-//! - [`memory`]: columns in memory in place of a file; `missing`: readings that they lack;
+//! - [`memory`]: columns in memory in place of a file; their missing readings;
 //! - `lines`, `encoding`, `comment`, `row`, `number`: lines of a text, rows and cells.
 
 mod ballbar_xml;
@@ -19,7 +19,6 @@ mod formats;
 mod json_lines;
 mod lines;
 pub mod memory;
-mod missing;
 mod mmt;
 pub(crate) mod number;
 pub(crate) mod request;

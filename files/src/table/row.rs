@@ -1,10 +1,23 @@
-//! One row of a data file.
+//! The rows of a data file.
 
 use std::ops::Range;
 
+use abbe_model::Diagnostic;
 use encoding_rs::Encoding;
 
 use super::lines::Line;
+
+/// The rows of a file, one after another. All have the same number of cells.
+pub(super) trait Rows {
+    /// The next row, or `None` at the end.
+    ///
+    /// # Errors
+    /// If the next line is not a row of the format, or beyond a limit.
+    fn next_row(&mut self) -> Result<Option<Row>, Diagnostic>;
+
+    /// Takes a row that is no longer needed, so that the next one can use its memory: a file has millions of them.
+    fn reuse(&mut self, _: Row) {}
+}
 
 /// One row: its cells, and their place in the file.
 #[derive(Clone, Debug)]

@@ -12,9 +12,9 @@ use calamine::{Data, Error, Ods, Reader, Sheets, Xls, Xlsb, Xlsx, XlsxError, ope
 use zip::ZipArchive;
 
 use super::comment::is_comment;
-use super::format::{Content, DataFormat, Rows, has_extension};
+use super::format::{Content, DataFormat, has_extension};
 use super::request::{Format, Request};
-use super::row::Row;
+use super::row::{Row, Rows};
 use crate::stamp::FileStamp;
 use crate::store::Store;
 

@@ -10,10 +10,10 @@ use abbe_model::axis::AxisKind;
 use abbe_model::diagnostic::{Diagnostic, Location};
 use abbe_model::words::counted;
 
-use super::format::{Content, DataFormat, Rows, has_extension, starts_with};
+use super::format::{Content, DataFormat, has_extension, starts_with};
 use super::lines::Lines;
 use super::request::Request;
-use super::row::Row;
+use super::row::{Row, Rows};
 use crate::stamp::FileStamp;
 use crate::store::Store;
 

@@ -37,8 +37,8 @@ use super::unusable;
 use faults::{Fault, faults};
 use machine::Fitted;
 use results::MachineHistory;
-use scatter::{Prior, priors_of_differences, priors_of_models};
-use series::Series;
+use scatter::{priors_of_differences, priors_of_models};
+use series::{Prior, Series};
 use sessions::Machine;
 use significance::most_significant;
 

@@ -9,12 +9,10 @@
 //! The first estimate is that of the differences of neighbouring sessions, which a step enters once; the second is that
 //! about the models which the first one yields, within the segments between steps.
 
-use super::series::Series;
+use super::series::{LEAST_VARIANCE, Prior, Series};
 use super::sessions::Machine;
 use abbe_identify::numerics::median;
 
-/// Smallest variance, in units of the stated one: sessions that agree to a millionth of their uncertainties.
-const LEAST_VARIANCE: f64 = 1e-12;
 /// Standard deviation of a normal distribution over its median absolute deviation.
 const NORMAL: f64 = 1.4826;
 /// Degrees of freedom that one difference of neighbouring sessions adds to the median of all: half the inverse square
@@ -28,21 +26,6 @@ const FEWEST_FOR_SPREAD: usize = 4;
 const MANY_MACHINES: usize = 20;
 /// Most degrees of freedom of a prior. The t distribution is normal long before.
 const MOST_FREEDOM: f64 = 1e4;
-
-/// What is known of the variance of a series before its own scatter: that of an estimate with so many degrees of
-/// freedom, in units of the stated variance.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Prior {
-    pub variance: f64,
-    pub freedom: f64,
-}
-
-impl Prior {
-    /// Its sum of squares. A trace remains of none, so that sessions without any scatter have a variance.
-    pub fn sum_of_squares(&self) -> f64 {
-        self.freedom * self.variance + LEAST_VARIANCE
-    }
-}
 
 /// An estimate of a variance.
 #[derive(Clone, Copy)]

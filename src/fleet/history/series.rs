@@ -5,7 +5,6 @@
 //! residual within the segments beside the prior of the other series, so that a change is no scatter.
 
 use super::DAYS_PER_YEAR;
-use super::scatter::Prior;
 use super::sessions::Machine;
 use abbe_identify::numerics::median;
 use abbe_identify::numerics::regression::Regression;
@@ -40,6 +39,24 @@ impl Costs {
             terms.map(|terms| student_quantile(0.5 * probability, total - terms as f64).powi(2)).collect()
         };
         Costs { drift: costs(0.5 * threshold), step: costs(0.5 * threshold / (positions * odds).max(1.0)) }
+    }
+}
+
+/// Smallest variance, in units of the stated one: sessions that agree to a millionth of their uncertainties.
+pub(super) const LEAST_VARIANCE: f64 = 1e-12;
+
+/// What is known of the variance of a series before its own scatter: that of an estimate with so many degrees of
+/// freedom, in units of the stated variance.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Prior {
+    pub variance: f64,
+    pub freedom: f64,
+}
+
+impl Prior {
+    /// Its sum of squares. A trace remains of none, so that sessions without any scatter have a variance.
+    pub fn sum_of_squares(&self) -> f64 {
+        self.freedom * self.variance + LEAST_VARIANCE
     }
 }
 

@@ -5,7 +5,7 @@
 //! The p value counts all positions (Bonferroni). A pair of steps, such as a collision and its repair, has a share of
 //! a tenth of the false claims.
 
-use super::scatter::Prior;
+use super::series::Prior;
 use super::series::Series;
 use abbe_identify::numerics::tails::student_tail;
 
