@@ -6,7 +6,7 @@
 //! - `machine`: all parameters of one machine together, by generalised least squares with the covariances of the
 //!   sessions;
 //! - [`events`]: steps of several parameters at one time, and what they are;
-//! - [`chart`]: control charts; [`faults`]: effects of many sessions, by alias set; [`results`]: what is reported of a
+//! - [`chart`]: control charts; [`mod@faults`]: effects of many sessions, by alias set; [`results`]: what is reported of a
 //!   machine; [`statements`](mod@statements): what follows for the user.
 //!
 //! Every series is tested for any change. Benjamini and Hochberg (1995, J. R. Stat. Soc. B 57, 289) control the false
