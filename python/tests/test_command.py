@@ -102,7 +102,7 @@ def test_simulation(command, chapter5, tmp_path):
     hidden = truth.simulate({**values, "EZC~C:h2.cos": 2.0}, seed=7, hide_effects=True)
     assert hidden.effects == () and "[[effect]]" not in hidden.to_toml()
     c = np.radians(hidden.readings("C150")["c_deg"])
-    difference = hidden.readings("C150")["length_mm"] - session.readings("C150")["length_mm"]
+    difference = hidden.readings("C150")["reading_mm"] - session.readings("C150")["reading_mm"]
     assert np.corrcoef(difference, np.cos(2 * c))[0, 1] ** 2 > 0.9
 
 
