@@ -161,8 +161,9 @@ fn judge(
     let [_, whole] = Symmetric::of((phases.transpose() * &own * phases).as_ref())?.extremes();
     let [_, largest_own] = Symmetric::of(own.as_ref())?.extremes();
     let has_signal = largest_own * size * size >= 1.0;
-    // Without a signal the share would be a quotient of rounding errors.
-    let share = if has_signal && whole > 0.0 { (weakest / whole).clamp(0.0, 1.0) } else { 0.0 };
+    // Without a signal, or at a phase without one, the share would be a quotient of rounding errors.
+    let share =
+        if has_signal && whole > ROUNDING_OF_SQUARES * largest_own { (weakest / whole).clamp(0.0, 1.0) } else { 0.0 };
     let surviving_share = if share > ROUNDING_OF_SQUARES { share } else { 0.0 };
     let amplitude = |threshold: f64| {
         let amplitude = (threshold / weakest).sqrt();
