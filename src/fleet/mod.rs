@@ -35,7 +35,7 @@ pub const BUILD: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("ABBE_SOURC
 /// The caller ended the work.
 pub const INTERRUPTED: Code = Code { area: Area::Other, word: "interrupted" };
 
-/// What a unit of work asks before each of its steps: whether to go on.
+/// What the analysis of a session asks before each of its steps: whether to go on.
 pub type ShouldContinue<'g> = &'g (dyn Fn() -> bool + Sync);
 
 /// The caller ended the work before the session was done.
