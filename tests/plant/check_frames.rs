@@ -12,6 +12,10 @@ fn near(found: Vector3<f64>, expected: [f64; 3]) {
     assert!((found - Vector3::from(expected)).norm() < 1e-12, "{found:?} is not {expected:?}");
 }
 
+fn stated(workpiece_ball_mm: [f64; 3], workpiece_ball_on: AxisName, bar_mm: f64) -> Stated {
+    Stated { workpiece_ball_mm, workpiece_ball_on, spindle_ball_mm: [0.0; 3], bar_mm }
+}
+
 fn reading(position: [f64; 5], stated: &Stated, component: Component, value: f64) -> f64 {
     let mut displacement = Displacement::default();
     displacement.add(component, value);
@@ -73,7 +77,7 @@ fn the_chain_goes_from_the_bed_outwards_on_either_side() {
 #[test]
 fn readings_by_hand() {
     // A150 of chapter 5 at A = 0: ball at (0, 100, 0), spindle ball at (−50√5, 0, 0), bar 150.
-    let stated = Stated { workpiece_ball_mm: [0.0, 100.0, 0.0], spindle_ball_mm: [0.0; 3], bar_mm: 150.0 };
+    let stated = stated([0.0, 100.0, 0.0], AxisName::C, 150.0);
     let offset = 50.0 * 5.0_f64.sqrt();
     let at = |component, value| reading([-offset, 0.0, 0.0, 0.0, 0.0], &stated, component, value) - 150.0;
     let deviations = [
@@ -95,9 +99,20 @@ fn readings_by_hand() {
     }
 }
 
+/// C stands 90° away and is shifted: a ball on A is where A has it, and one on the table where both have it.
+#[test]
+fn a_ball_on_the_tilting_axis_is_not_carried_by_the_table() {
+    let at = |on| {
+        let stated = stated([100.0, 0.0, 0.0], on, 100.0);
+        reading([0.0, 0.0, 0.0, 0.0, FRAC_PI_2], &stated, Component::Location(Freedom::X, AxisName::C), 30.0)
+    };
+    assert!((at(AxisName::A) - 100.0).abs() < 1e-12);
+    assert!((at(AxisName::C) - 30.0_f64.hypot(100.0)).abs() < 1e-12);
+}
+
 #[test]
 fn the_sensor_has_a_gain_about_the_stated_length_and_a_delay() {
-    let stated = Stated { workpiece_ball_mm: [0.5, 0.0, 0.0], spindle_ball_mm: [0.0; 3], bar_mm: 100.0 };
+    let stated = stated([0.5, 0.0, 0.0], AxisName::C, 100.0);
     // Distance 99.5 mm: 0.5 mm too short, with a gain error of 1 %.
     let gain = reading([100.0, 0.0, 0.0, 0.0, 0.0], &stated, Component::Sensor, 0.01);
     assert!((gain - (100.0 - 0.505)).abs() < 1e-12);
@@ -112,9 +127,10 @@ fn the_sensor_has_a_gain_about_the_stated_length_and_a_delay() {
 fn the_gravity_moment_about_a_lowers_the_ball() {
     let machine = Machine::default();
     // Gravity rotates a ball at +Y about X in the negative sense.
-    let moment = machine.gravity_moment_a_mm(&[0.0; 5], [0.0, 100.0, 0.0]);
+    let stated = stated([0.0, 100.0, 0.0], AxisName::C, 100.0);
+    let moment = machine.gravity_moment_a_mm(&[0.0; 5], &stated);
     assert!((moment + 100.0).abs() < 1e-12);
-    let moment = machine.gravity_moment_a_mm(&[0.0, 0.0, 0.0, FRAC_PI_2, 0.0], [0.0, 100.0, 0.0]);
+    let moment = machine.gravity_moment_a_mm(&[0.0, 0.0, 0.0, FRAC_PI_2, 0.0], &stated);
     assert!(moment.abs() < 1e-12);
     assert!((unit_size("arcsec") * 3600.0 - 1.0_f64.to_radians()).abs() < 1e-15);
 }

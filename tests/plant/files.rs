@@ -74,10 +74,11 @@ fn session_toml(plan: &Plan, states_noise: bool) -> String {
         let _ = write!(
             text,
             "\n[[test]]\nname = \"{name}\"\ndata = \"{name}.csv\"\nbar_mm = {bar:?}\nworkpiece_ball_mm = {workpiece:?}\n\
-             spindle_ball_mm = {spindle:?}\nsetup = \"{setup}\"\n",
+             {frame}spindle_ball_mm = {spindle:?}\nsetup = \"{setup}\"\n",
             name = test.name,
             bar = stated.bar_mm,
             workpiece = stated.workpiece_ball_mm,
+            frame = if stated.workpiece_ball_on == AxisName::A { "workpiece_ball_frame = \"axis A\"\n" } else { "" },
             spindle = stated.spindle_ball_mm,
             setup = test.setup,
         );

@@ -10,10 +10,10 @@ use std::f64::consts::FRAC_PI_2;
 pub enum Kind {
     /// Chapter 5 of the thesis: A100, A150, C100, C150, one workpiece ball.
     Rotary,
-    /// Chapter 4 of the thesis: the ball for the A tests at +Y, remounted at +X for the C tests. (There the first is
-    /// mounted on the A table; here it is mounted on the C table, which is at zero.)
+    /// Chapter 4 of the thesis: the ball for the A tests at +Y of the A table, remounted at +X of the C table for the C
+    /// tests.
     Chapter4,
-    /// Chapter 6 of the thesis: A tests at X = ±550 mm, C tests at two heights, four mounts.
+    /// Chapter 6 of the thesis: A tests at X = ±550 mm of the A table, C tests at two heights, four mounts.
     Chapter6,
     /// Four tests of C with the table tilted to A = −20°, 0°, 30°, 60°: the influence of A on C.
     TiltedTable,
@@ -70,14 +70,14 @@ impl Kind {
                 table("C150", 150.0, [0.0, 100.0, 0.0], "P1", with(zero, AxisName::Z, x(offset_mm)), step_deg),
             ],
             Kind::Chapter4 => vec![
-                tilt("A100", 100.0, [0.0, 100.0, 0.0], "P1", 0.0, step_deg),
-                tilt("A150", 150.0, [0.0, 100.0, 0.0], "P1", -offset_mm, step_deg),
+                on_a(tilt("A100", 100.0, [0.0, 100.0, 0.0], "P1", 0.0, step_deg)),
+                on_a(tilt("A150", 150.0, [0.0, 100.0, 0.0], "P1", -offset_mm, step_deg)),
                 table("C100", 100.0, [100.0, 0.0, 0.0], "P2", zero, step_deg),
                 table("C150", 150.0, [100.0, 0.0, 0.0], "P2", with(zero, AxisName::Z, x(offset_mm)), step_deg),
             ],
             Kind::Chapter6 => vec![
-                tilt("A-plus", 100.0, [550.0, 100.0, 0.0], "P1", 550.0, step_deg),
-                tilt("A-minus", 100.0, [-550.0, 100.0, 0.0], "P2", -550.0, step_deg),
+                on_a(tilt("A-plus", 100.0, [550.0, 100.0, 0.0], "P1", 550.0, step_deg)),
+                on_a(tilt("A-minus", 100.0, [-550.0, 100.0, 0.0], "P2", -550.0, step_deg)),
                 table("C0", 100.0, [100.0, 0.0, 0.0], "P3", zero, step_deg),
                 table("C78", 100.0, [100.0, 0.0, 78.0], "P4", with(zero, AxisName::Z, x(78.0)), step_deg),
             ],
@@ -190,7 +190,12 @@ fn default_unknowns() -> Vec<Component> {
 }
 
 fn stated(workpiece_ball_mm: [f64; 3], bar_mm: f64) -> Stated {
-    Stated { workpiece_ball_mm, spindle_ball_mm: [0.0; 3], bar_mm }
+    Stated { workpiece_ball_mm, workpiece_ball_on: AxisName::C, spindle_ball_mm: [0.0; 3], bar_mm }
+}
+
+/// The test with its ball on the A table, below C.
+fn on_a(test: Test) -> Test {
+    Test { stated: Stated { workpiece_ball_on: AxisName::A, ..test.stated }, ..test }
 }
 
 fn circle(radius_mm: f64, phase_rad: f64) -> [Motion; 5] {

@@ -54,8 +54,10 @@ pub struct Commanded {
 /// Stated positions of both balls and stated bar length, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stated {
-    /// Workpiece ball in the table frame.
+    /// Workpiece ball in the frame of the body that carries it.
     pub workpiece_ball_mm: [f64; 3],
+    /// The axis that carries it: C, or A below it.
+    pub workpiece_ball_on: AxisName,
     /// Spindle ball in the tool frame.
     pub spindle_ball_mm: [f64; 3],
     /// Bar length.
@@ -100,15 +102,27 @@ impl Machine {
         })
     }
 
-    /// `P_w` in R, mm.
+    /// `P_w` in R, mm, of a ball on the C table.
     pub fn workpiece_point(
         &self,
         position: &[f64; 5],
         displacement: &Displacement,
         point_mm: [f64; 3],
     ) -> Vector3<f64> {
+        self.workpiece_point_on(AxisName::C, position, displacement, point_mm)
+    }
+
+    /// `P_w` in R, mm, of a ball on this axis, with what lies between it and the bed.
+    pub fn workpiece_point_on(
+        &self,
+        on: AxisName,
+        position: &[f64; 5],
+        displacement: &Displacement,
+        point_mm: [f64; 3],
+    ) -> Vector3<f64> {
         let point = Vector3::from(point_mm) + Vector3::from(displacement.workpiece_ball);
-        self.carried(&[AxisName::A, AxisName::C], position, displacement, point)
+        let axes = if on == AxisName::A { &[AxisName::A][..] } else { &[AxisName::A, AxisName::C] };
+        self.carried(axes, position, displacement, point)
     }
 
     /// `P_s` in R, mm.
@@ -123,7 +137,8 @@ impl Machine {
         let position: [f64; 5] = std::array::from_fn(|i| {
             commanded.position[i] + displacement.position[i] - commanded.velocity[i] * displacement.delay
         });
-        let workpiece = self.workpiece_point(&position, displacement, stated.workpiece_ball_mm);
+        let on = stated.workpiece_ball_on;
+        let workpiece = self.workpiece_point_on(on, &position, displacement, stated.workpiece_ball_mm);
         let tool = self.tool_point(&position, displacement, stated.spindle_ball_mm);
         let deviation = (workpiece - tool).norm() - displacement.bar - stated.bar_mm;
         stated.bar_mm + deviation * (1.0 + displacement.gain)
@@ -131,9 +146,10 @@ impl Machine {
 
     /// The moment of a unit weight at the workpiece ball about the A axis, mm: `d · ((p − o) × g)` with g = −Z and the
     /// nominal chain.
-    pub fn gravity_moment_a_mm(&self, position: &[f64; 5], workpiece_ball_mm: [f64; 3]) -> f64 {
+    pub fn gravity_moment_a_mm(&self, position: &[f64; 5], stated: &Stated) -> f64 {
         let axis = &self.axes[AxisName::A.index()];
-        let ball = self.workpiece_point(position, &Displacement::default(), workpiece_ball_mm);
+        let Stated { workpiece_ball_on: on, workpiece_ball_mm, .. } = *stated;
+        let ball = self.workpiece_point_on(on, position, &Displacement::default(), workpiece_ball_mm);
         axis.direction.dot(&(ball - axis.origin_mm).cross(&-Vector3::z()))
     }
 }

@@ -137,7 +137,7 @@ fn at_angle(machine: &Machine, test: &Test, place: PathPoint) -> Instant {
         since_reversal_s: states.map(|state| state.since_reversal_s),
         way_since_reversal: states.map(|state| state.way),
         temperature_c: 20.0,
-        gravity_moment_mm: machine.gravity_moment_a_mm(&commanded.position, test.stated.workpiece_ball_mm),
+        gravity_moment_mm: machine.gravity_moment_a_mm(&commanded.position, &test.stated),
         commanded,
     }
 }

@@ -9,6 +9,7 @@ use abbe::identify::fit::prepare;
 use abbe::identify::noise::{Noise, NoiseSource};
 use abbe::identify::numerics::circle;
 use abbe::identify::problem::Problem;
+use abbe::model::chain::Frame;
 use abbe::model::instrument::Station;
 use abbe::model::session::motion::{Motion, Moved};
 use abbe::model::session::planned;
@@ -79,7 +80,8 @@ fn measured(plan: &Session, errors: &Errors, moved: [f64; 3], noise: Option<(f64
             let tilted = turned([0.0, ey, ez], [0.0, rb, rc], Vector3::x(), at(a));
             let [ex, ey, ra, rb] = errors.c;
             let table = turned([ex, ey, 0.0], [ra, rb, 0.0], Vector3::z(), at(c));
-            let workpiece = tilted * (table * Point3::from(ball));
+            let on_table = bar.workpiece_ball.frame == Frame::Table;
+            let workpiece = tilted * if on_table { table * Point3::from(ball) } else { Point3::from(ball) };
             let spindle = Point3::from(bar.spindle_ball.mm) + Vector3::new(at(x), at(y), at(z));
             let normal: f64 = StandardNormal.sample(&mut random);
             readings.observed[row] = (workpiece - spindle).norm() + noise.map_or(0.0, |(sigma, _)| sigma * normal);

@@ -22,6 +22,7 @@ fn turn(name: &str, radius_mm: f64) -> Test {
         name: name.to_string(),
         stated: Stated {
             workpiece_ball_mm: [0.0, radius_mm, 0.0],
+            workpiece_ball_on: AxisName::C,
             spindle_ball_mm: [0.0; 3],
             bar_mm: radius_mm.hypot(HEIGHT_MM),
         },

@@ -148,7 +148,7 @@ fn both_settings_agree_with_the_plant() {
         }
         let position: [f64; 5] =
             std::array::from_fn(|i| uniform(&mut random, if AxisName::ALL[i].is_rotary() { 3.0 } else { 250.0 }));
-        let stated = Stated { workpiece_ball_mm, spindle_ball_mm, bar_mm: 0.0 };
+        let stated = Stated { workpiece_ball_mm, workpiece_ball_on: AxisName::C, spindle_ball_mm, bar_mm: 0.0 };
         let commanded = Commanded { position, velocity: [0.0; 5] };
         let plant = plant::machine::Machine::default();
         let expected = plant::rtest::reading_mm(&plant, &nest, &commanded, &stated, &displacement);

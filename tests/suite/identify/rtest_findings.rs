@@ -23,7 +23,7 @@ fn circles(phase_rad: f64) -> Motion {
 fn test(name: &str, workpiece_ball_mm: [f64; 3], motions: [Motion; 5]) -> Test {
     Test {
         name: name.to_string(),
-        stated: Stated { workpiece_ball_mm, spindle_ball_mm: [0.0; 3], bar_mm: 0.0 },
+        stated: Stated { workpiece_ball_mm, workpiece_ball_on: AxisName::C, spindle_ball_mm: [0.0; 3], bar_mm: 0.0 },
         setup: name.to_string(),
         motions,
         range_deg: [0.0, 360.0],
