@@ -86,6 +86,15 @@ def test_guesses_lead_on(results, guess, ours):
     assert not hasattr(results[0], guess)
 
 
+@pytest.mark.parametrize("noise_um, why", [(0.01, "less than a tenth of the noise"), (0.1, "far below the noise")])
+def test_a_residual_below_the_noise_is_not_judged(chapter5, tmp_path, noise_um, why):
+    file = chapter5.simulate({"EY0A": 30.0}, seed=3, noise_um=noise_um).save(tmp_path / "run")
+    file.write_text(file.read_text().replace(f"noise_um = {noise_um}", "noise_um = 0.3"))
+    shown = str(abbe.Session.read(file).fit())
+    opening = shown[: shown.index("readings, noise 0.300")]
+    assert "not judged" in opening and why in opening and "What to correct: nothing;" not in opening, opening
+
+
 def test_compare_and_export(results, tmp_path):
     fit = results[0]
     found = abbe.compare(fit, fit.model(), names=["first", "again"], places=3)
