@@ -158,7 +158,7 @@ pub fn spectrum_plot(spectrum: &Spectrum, maximum: f64, effects: &[Effect]) -> F
     Figure::new(
         format!("spectrum-{}-{}", spectrum.of, spectrum.over),
         format!("{}: spectrum of the residual over {}", spectrum.of, spectrum.over),
-        "Amplitude of a sine and cosine of each order, fitted separately.",
+        "Amplitude of a sine and cosine of each order. Over a part of a turn they are fitted together.",
         lines,
     )
 }
