@@ -196,17 +196,22 @@ fn named(found: &[EffectResult]) -> String {
 fn key_figures(trace: &TraceOutcome) -> Vec<KeyFigure> {
     let result = &trace.result;
     let mut figures = quality::key_figures(&result.after, Some(&result.before));
-    let unique = result.effects.iter().filter(|effect| effect.unique).count();
-    match result.effects.as_slice() {
-        [] => {}
-        [one] if one.unique => {
+    // Members of a family under a prior are compared with nothing.
+    let compared: Vec<&EffectResult> = result.effects.iter().filter(|effect| effect.prior.is_none()).collect();
+    let unique = compared.iter().filter(|effect| effect.unique).count();
+    match (compared.as_slice(), result.effects.len()) {
+        ([], _) => {}
+        ([one], 1) if one.unique => {
             figures.push(KeyFigure::new("Uniqueness", "unique", format!("among {}", effects::screened(result))));
         }
-        [one] => {
+        ([one], 1) => {
             let count = format!("1 of {}", one.explanation_count);
             figures.push(KeyFigure::new("Uniqueness", count, "indistinguishable explanations"));
         }
-        many => figures.push(KeyFigure::new("Uniqueness", format!("{unique} of {}", many.len()), "effects are unique")),
+        (some, all) => {
+            let which = if some.len() == all { "effects are unique" } else { "compared effects are unique" };
+            figures.push(KeyFigure::new("Uniqueness", format!("{unique} of {}", some.len()), which));
+        }
     }
     let structure = if result.remainder.structured { "significant" } else { "not significant" };
     figures.push(KeyFigure::new("Remaining structure", structure, format!("p = {:.3}", result.remainder.p_value)));
