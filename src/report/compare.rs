@@ -54,7 +54,8 @@ pub fn report(machine: &str, stated: &StatedComparison<'_>, with_workspace: bool
 fn sentence(comparison: &Comparison, number: usize, pair: &Pair) -> String {
     let volume = match (comparison.workspace.first(), comparison.workspace.get(number + 1)) {
         (Some(before), Some(after)) => {
-            format!("{}; ", statements::volumetric(before.rms_um, after.rms_um))
+            let within = 2.0 * before.u_um.hypot(after.u_um);
+            format!("{}; ", statements::volumetric(before.rms_um, after.rms_um, within))
         }
         _ => String::new(),
     };

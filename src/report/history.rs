@@ -146,11 +146,11 @@ fn headline(found: &FleetHistory) -> String {
     let sessions: usize = found.machines.iter().map(|machine| machine.sessions).sum();
     let changed = found.machines.iter().flat_map(|machine| &machine.parameters).filter(|one| has_changed(one)).count();
     format!(
-        "{}, {}: {} of {} parameters over time have changed (false discovery rate {})",
+        "{}, {}: {} of {} over time changed (false discovery rate {})",
         counted(found.machines.len(), "machine"),
         counted(sessions, "session"),
         changed,
-        found.tested_series,
+        counted(found.tested_series, "parameter"),
         found.false_discovery_rate
     )
 }

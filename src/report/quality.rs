@@ -128,7 +128,8 @@ pub fn agreement(goodness: Goodness, degrees_of_freedom: usize) -> String {
                 format!("not judged: the residual is far below the noise ({figures}), so the noise is overstated")
             }
             Some(NotJudged::WrongUnit) => {
-                "not judged: less than a tenth of the noise, or no size of such an instrument; the unit of the readings is the likely cause"
+                "not judged: the residual is less than a tenth of the noise, or the readings have a size that such an \
+                 instrument does not read; their unit is the likely cause"
                     .to_string()
             }
             Some(NotJudged::NoDegreesOfFreedom) => {

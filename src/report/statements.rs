@@ -9,8 +9,8 @@ use abbe::codegen::nc::has_letters;
 #[cfg(feature = "fleet")]
 use abbe::fleet::history::statements::{ChangedInHistory, HistoryStatements};
 use abbe::identify::results::{
-    AxisCorrection, DeterminedBy, Estimate, GoodStatement, LineQuantity, MeasureStatement, NextStep, NotJudged,
-    ParameterChange, Statements,
+    AxisCorrection, DeterminedBy, Estimate, LineQuantity, MeasureStatement, NextStep, NotJudged, ParameterChange,
+    Statements,
 };
 use abbe::identify::tolerance::rule::Decision;
 use abbe::model::chain::Machine;
@@ -47,7 +47,7 @@ pub fn opening(
     degrees_of_freedom: usize,
     commands: &Commands,
 ) -> Vec<Sentence> {
-    let good = good("Goodness of fit", &statements.good, degrees_of_freedom);
+    let good = good("Goodness of fit", statements, degrees_of_freedom);
     let mut sentences = vec![good.into(), correct(statements).into()];
     if statements.measure.step == NextStep::StateNoise {
         let keys = session.keys_of_noise();
@@ -62,25 +62,33 @@ pub fn opening(
     sentences
 }
 
-/// How the volumetric error changed, in words.
-pub fn volumetric(before_um: f64, after_um: f64) -> String {
+/// How the volumetric error changed, in words. A change by no more than `within_um` is none.
+pub fn volumetric(before_um: f64, after_um: f64, within_um: f64) -> String {
     let [before, after] = [before_um, after_um].map(|um| fixed(um, 2));
     match before_um.total_cmp(&after_um) {
         _ if before == after => format!("the volumetric error stays at {after} µm rms"),
+        _ if (after_um - before_um).abs() <= within_um => {
+            format!("the volumetric error is {before} and {after} µm rms, the same within its uncertainty")
+        }
         Ordering::Less => format!("the volumetric error rises from {before} to {after} µm rms"),
         _ => format!("the volumetric error falls from {before} to {after} µm rms"),
     }
 }
 
-/// Is it good: residual against noise, and limits, after what is judged.
-fn good(of: &str, good: &GoodStatement, degrees_of_freedom: usize) -> String {
+/// Is it good: residual against noise, and limits, after what is judged. A set-up that the readings contradict may be the cause.
+fn good(of: &str, statements: &Statements, degrees_of_freedom: usize) -> String {
+    let good = &statements.good;
     let limits = match good.decision {
         None => "no limits are stated".to_string(),
         Some(Decision::Pass) => "all limits pass".to_string(),
         Some(Decision::Fail) => format!("fails: {}", good.failed.join(", ")),
         Some(Decision::Undecided) => format!("undecided: {}", good.undecided.join(", ")),
     };
-    format!("{of}: {}; {limits}", agreement(good.goodness, degrees_of_freedom))
+    let or = match statements.measure.step {
+        NextStep::CorrectSession if good.goodness.verdict.lacks_an_effect() => ", or the session is not as stated",
+        _ => "",
+    };
+    format!("{of}: {}{or}; {limits}", agreement(good.goodness, degrees_of_freedom))
 }
 
 /// What to correct: the changes that exceed their expanded uncertainty, the largest first.
@@ -92,6 +100,9 @@ fn correct(statements: &Statements) -> String {
         return match statements.good.goodness.not_judged {
             Some(NotJudged::WrongUnit) => {
                 "What to correct: nothing yet; the unit of the readings is in doubt".to_string()
+            }
+            _ if statements.measure.step == NextStep::CorrectSession => {
+                "What to correct: nothing yet; what the readings contradict biases the estimates".to_string()
             }
             _ => "What to correct: nothing yet; the effect that the model lacks biases the estimates".to_string(),
         };
@@ -283,7 +294,7 @@ pub fn of_validation(
     let mut sentences: Vec<Sentence> = Vec::new();
     if !statements.changed.is_empty() {
         let volume = match result.volumetric_rms_um[..] {
-            [before, after] => format!("{}; ", volumetric(before, after)),
+            [before, after] => format!("{}; ", volumetric(before, after, 0.0)),
             _ => String::new(),
         };
         let moved = first_of(&moved.collect::<Vec<_>>(), NAMED, ", ", "further parameter");
@@ -496,7 +507,7 @@ pub fn corrections(statements: &Statements) -> Table {
 
 #[cfg(test)]
 mod tests {
-    use abbe::identify::results::{Goodness, GoodnessVerdict};
+    use abbe::identify::results::{GoodStatement, Goodness, GoodnessVerdict};
 
     use super::*;
 
@@ -514,14 +525,15 @@ mod tests {
     /// A residual that is taken for noise may still have structure: the unit is in doubt only where it is.
     #[test]
     fn what_keeps_from_correcting_is_why_the_estimates_are_not_quotable() {
-        for (not_judged, why) in [
-            (None, "effect that the model lacks"),
-            (Some(NotJudged::NoNoise), "effect that the model lacks"),
-            (Some(NotJudged::WrongUnit), "unit of the readings"),
+        for (not_judged, step, why) in [
+            (None, NextStep::Trace, "effect that the model lacks"),
+            (None, NextStep::CorrectSession, "what the readings contradict"),
+            (Some(NotJudged::NoNoise), NextStep::Trace, "effect that the model lacks"),
+            (Some(NotJudged::WrongUnit), NextStep::CheckUnit, "unit of the readings"),
         ] {
             let goodness = Goodness { not_judged, ..Goodness::default() }.with_verdict(GoodnessVerdict::Structured);
             let good = GoodStatement { goodness, ..GoodStatement::default() };
-            let measure = NextStep::Trace.into();
+            let measure = step.into();
             let statements =
                 Statements { good, correct: Vec::new(), changed: Vec::new(), further: Vec::new(), measure };
             assert!(correct(&statements).contains(why), "{}", correct(&statements));

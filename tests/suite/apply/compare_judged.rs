@@ -48,6 +48,11 @@ fn a_session_that_hides_a_drift_judges_nothing() {
         assert_eq!(difference["significant"], false, "{difference}");
     }
     assert!(screen.contains("the differences are not judged.") && !screen.contains("significant"), "{screen}");
+    // Nor does the volumetric error rise or fall by less than its uncertainty.
+    let volume = |k: usize, key: &str| found["workspace"][k][key].as_f64().unwrap();
+    let within = 2.0 * volume(0, "u_um").hypot(volume(1, "u_um"));
+    assert!((volume(0, "rms_um") - volume(1, "rms_um")).abs() < within, "{screen}");
+    assert!(screen.contains("µm rms, the same within its uncertainty;"), "{screen}");
     let command = format!("abbe trace {} --write", text(&after));
     assert!(screen.contains(&command), "{screen}");
     // A model of the session says so too.
