@@ -71,8 +71,9 @@ impl Remaining {
             }
         };
         format!(
-            "the model is {without} um rms over the range of its readings; the plain location errors leave {plain}, those \
-             written, which leave least without the effects, {written}, the whole model with its effects 0; {presumed}"
+            "the errors of the model are {without} um rms over the range of its readings; the plain location errors leave \
+             {plain}, those written, which leave least without the effects, {written}, the whole model with its effects 0; \
+             {presumed}"
         )
     }
 }

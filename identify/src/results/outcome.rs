@@ -105,8 +105,8 @@ impl Goodness {
                      noise that the instrument has"
                 }
                 Some(NotJudged::WrongUnit) => {
-                    "the unit of the readings is in doubt (less than a tenth of the noise, or no size of such an instrument): \
-                     it is probably not the stated one; check units and noise"
+                    "the unit of the readings is in doubt (residual less than a tenth of the noise, or readings of a size that such \
+                     an instrument does not read): it is probably not the stated one; check units and noise"
                 }
                 Some(NotJudged::NoDegreesOfFreedom) => {
                     "no degrees of freedom are left: whether the model lacks an effect cannot be judged; measure more \

@@ -207,7 +207,9 @@ fn free(tests: &mut [Test], thing: &str, is_meant: impl Fn(&Test, SharedBy) -> b
 fn statement(thing: &str, several: bool) -> String {
     let is = if several { "are" } else { "is" };
     match thing {
-        "bar" => format!("{is} not as long as `bar_mm`, or the lengths in data with `length_mm`, state"),
+        "bar" => {
+            format!("{is} not as long as stated (by `bar_mm`, and in data with `length_mm` by the lengths themselves)")
+        }
         "workpiece_ball" | "spindle_ball" => format!("{is} not where `{thing}_mm` states"),
         _ => format!("{is} not as stated"),
     }
