@@ -26,7 +26,12 @@ fn turning(axis: AxisName, radius_mm: f64, bar_mm: f64, range_deg: [f64; 2], ste
     let motions = with(with(all_stand(), axis, Motion::Turns), beside, Motion::Stands(offset_mm));
     Test {
         name: format!("{axis:?}{radius_mm}-{bar_mm}"),
-        stated: Stated { workpiece_ball_mm: ball_mm, workpiece_ball_on: AxisName::C, spindle_ball_mm: [0.0; 3], bar_mm },
+        stated: Stated {
+            workpiece_ball_mm: ball_mm,
+            workpiece_ball_on: AxisName::C,
+            spindle_ball_mm: [0.0; 3],
+            bar_mm,
+        },
         setup,
         motions,
         range_deg,

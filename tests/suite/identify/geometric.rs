@@ -323,6 +323,25 @@ fn one_command_shows_method_and_full_fit_on_the_same_readings() {
     assert!(String::from_utf8_lossy(&refused.stderr).contains("two tests in planes apart"));
 }
 
+/// A session that states no noise: that of a method, too, follows from the repeated runs of the tests, and with it its u.
+#[test]
+fn the_noise_of_a_method_is_that_of_the_repeats() {
+    const NOISE_MM: f64 = 0.8e-3;
+    for (chapter, method, values) in TABLES {
+        let mut session = measured(&plan(chapter), &table(values), [0.0; 3], Some((NOISE_MM, 11)));
+        let stated = compare(&Session { noise_mm: Some(NOISE_MM), ..session.clone() }, method, 1).unwrap();
+        session.noise_mm = None;
+        let found = compare(&session, method, 1).unwrap();
+        assert_eq!((found.noise.source, stated.noise.source), (NoiseSource::Repeats, NoiseSource::Stated), "{chapter}");
+        let ratio = found.noise.value / (1e3 * NOISE_MM);
+        assert!((ratio - 1.0).abs() < 0.05, "{chapter}: {ratio}");
+        for (own, other) in found.errors.iter().zip(&stated.errors) {
+            let [own, other] = [own, other].map(|row| row.u.unwrap());
+            assert!((own / other - 1.0).abs() < 0.06, "{chapter}: {own} and {other}");
+        }
+    }
+}
+
 /// Chapter 7 (Figs. 7.1, 7.2): the method of Chapter 5 with rotary axes that carry the spindle. The true values are in
 /// the comments of the sessions.
 #[test]

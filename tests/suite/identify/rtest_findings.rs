@@ -257,6 +257,7 @@ fn the_orders_of_a_worm_are_found_and_no_other_wave() {
             }
         }
         assert_eq!(outcome.result.verdict, TraceVerdict::Explained);
+        assert!(outcome.steps.len() <= 30, "{} steps", outcome.steps.len());
     });
 }
 

@@ -107,6 +107,61 @@ fn amplitude_and_phase_are_those_of_the_independent_plant() {
     }
 }
 
+/// The names of results are those of `simulate`, and a scale error is per length whatever its scale in the file: what is
+/// simulated is found under its name, in its unit.
+#[test]
+fn a_parameter_has_one_name_in_simulate_fit_and_trace() {
+    let effect = |component: &str, shape: &str| {
+        format!("[[effect]]\ncomponent = \"{component}\"\ndriver = \"X\"\nshape = \"{shape}\"\n")
+    };
+    let slope = "order = 1\nscale_mm = 250\n";
+    let cases = [
+        (
+            effect("EXX", "polynomial") + slope + &effect("EXX", "backlash"),
+            vec![("EXX~X:power1", 40.0, "um/m"), ("EXX~X:backlash", 3.0, "um")],
+        ),
+        (effect("EBX", "polynomial") + slope, vec![("EBX~X:power1", -12.0, "arcsec/m")]),
+    ];
+    for (effects, truth) in cases {
+        let folder = tempfile::tempdir().unwrap();
+        let plan = folder.path().join("plan.toml");
+        fs::copy(ready("laser/machine.toml"), folder.path().join("machine.toml")).unwrap();
+        let bundled = fs::read_to_string(ready("laser/plan.toml")).unwrap();
+        let (head, rest) = bundled.split_once("# Positioning.").unwrap();
+        let (_, test) = rest.split_once("[[test]]").unwrap();
+        fs::write(&plan, format!("{head}{effects}\n[[test]]{test}")).unwrap();
+        let values: Vec<String> = truth.iter().map(|(id, value, unit)| format!("{id}={value}{unit}")).collect();
+        let given: Vec<&str> = values.iter().flat_map(|value| ["--effect", value.as_str()]).collect();
+        let out = folder.path().join("run");
+        let printed = simulated(&plan, &out, &given);
+        for (command, key) in [("fit", "parameters"), ("trace", "after")] {
+            let file = out.join("session.toml");
+            if command == "trace" {
+                // A trace finds what the session does not declare.
+                let declared = fs::read_to_string(&file).unwrap();
+                let start = declared.find("[[effect]]").unwrap();
+                let end = declared.find("[[test]]").unwrap();
+                fs::write(&file, format!("{}{}", &declared[..start], &declared[end..])).unwrap();
+            }
+            let (found, screen) = crate::suite::identify::result_and_screen(command, &file, &[]);
+            let list = if key == "after" { &found["after"]["parameters"] } else { &found["parameters"] };
+            for (id, value, unit) in &truth {
+                let is_it = |own: &&serde_json::Value| own["id"] == *id;
+                let own =
+                    list.as_array().unwrap().iter().find(is_it).unwrap_or_else(|| panic!("{command} {id}: {screen}"));
+                assert_eq!(own["unit"], *unit, "{command}");
+                let [estimate, u] = ["value", "u"].map(|key| own[key].as_f64().unwrap());
+                assert!((estimate - value).abs() < 4.0 * u && u < 1.0, "{command} {value}: {own}");
+                let shown = unit.replace("um", "µm").replace("arcsec", "″");
+                for shows in [&printed, &screen] {
+                    let row = shows.lines().find(|line| line.trim_start().starts_with(&format!("{id} ")));
+                    assert!(row.is_some_and(|row| row.contains(&shown)), "{command} {id}: {shows}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn the_text_of_the_plan_is_kept_except_for_data_and_noise() {
     let folder = tempfile::tempdir().unwrap();

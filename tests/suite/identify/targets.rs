@@ -44,6 +44,16 @@ fn turn(about: [f64; 3], angle: f64) -> Rotation3<f64> {
 /// A target in R at these joint angles. Each joint has a tilt and a zero error; `eccentric` is an angular error of J2 once per
 /// turn, rad, and J5 is shifted by `shift_mm` along X.
 fn carried(target: [f64; 3], joints: [f64; 6], [eccentric, shift_mm]: [f64; 2]) -> Vector3<f64> {
+    carried_by(target, joints, eccentric, |joint| if joint == 5 { [shift_mm, 0.0, 0.0] } else { [0.0; 3] })
+}
+
+/// The same with any shift of each joint, mm.
+fn carried_by(
+    target: [f64; 3],
+    joints: [f64; 6],
+    eccentric: f64,
+    shift_mm: impl Fn(usize) -> [f64; 3],
+) -> Vector3<f64> {
     let mut point = Vector3::from(target);
     for (number, (direction, origin)) in JOINTS.iter().enumerate().rev() {
         let k = number as f64;
@@ -56,7 +66,7 @@ fn carried(target: [f64; 3], joints: [f64; 6], [eccentric, shift_mm]: [f64; 2]) 
         } else {
             Rotation3::identity()
         };
-        let shift = Vector3::x() * if number == 4 { shift_mm } else { 0.0 };
+        let shift = Vector3::from(shift_mm(number + 1));
         point = origin + shift + location * (motion * (turn(*direction, joints[number]) * (point - origin)));
     }
     point
@@ -225,6 +235,46 @@ fn one_shift_of_a_joint_is_one_change() {
     // Nothing changed: nothing is explained.
     let same = compare_inputs(names, vec![input(3, 0.0), input(4, 0.0)], &options, 1).unwrap();
     assert!(same.pairs[0].significant == 0 && same.pairs[0].single_changes.is_empty());
+}
+
+/// The screen of a comparison opens with the shift of one joint, also where several base parameters change with it: no second
+/// joint is said to have changed beside it.
+#[test]
+fn the_comparison_of_a_robot_opens_with_the_joint_that_moved() {
+    for (id, joint, shift_mm) in [("EX0J5", 5, [-0.25, 0.0, 0.0]), ("EX0J3", 3, [0.15, 0.0, 0.0])] {
+        let folder = tempfile::tempdir().unwrap();
+        let sessions = [("before", 5, [0.0; 3]), ("after", 6, shift_mm)].map(|(name, seed, shift_mm)| {
+            let own = folder.path().join(name);
+            fs::create_dir(&own).unwrap();
+            let moved = |target, joints| {
+                carried_by(target, joints, 0.0, |number| if number == joint { shift_mm } else { [0.0; 3] })
+            };
+            let file = written_by(&own, POSES, seed, &TARGETS, moved);
+            let stated = format!("kind = \"tracker\"\nnoise_um = {}", 1e3 * NOISE_MM);
+            let text = fs::read_to_string(&file).unwrap().replace("kind = \"tracker\"", &stated);
+            fs::write(&file, text).unwrap();
+            file
+        });
+        let json = folder.path().join("compared.json");
+        let run = abbe(&["compare", text(&sessions[0]), text(&sessions[1]), "--json", text(&json)]);
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        let screen = String::from_utf8(run.stdout).unwrap();
+        let found: serde_json::Value = serde_json::from_slice(&fs::read(&json).unwrap()).unwrap();
+        let pair = &found["pairs"][0];
+        let single = pair["single_changes"].as_array().unwrap();
+        let truth = single.iter().find(|one| one["id"] == id).unwrap_or_else(|| panic!("{id}: {screen}"));
+        let [value, u, probability] = ["value", "u", "probability"].map(|key| truth[key].as_f64().unwrap());
+        let truth_um = 1e3 * shift_mm[0];
+        assert!((value - truth_um).abs() < 4.0 * u && probability > 0.3, "{truth}");
+        let changed = screen.lines().find(|line| line.starts_with("What has changed: ")).unwrap();
+        let named = match pair["significant"].as_u64().unwrap() {
+            1 => format!("What has changed: {id} "),
+            _ => format!("What has changed: one parameter explains all differences: {id} "),
+        };
+        assert!(changed.starts_with(&named), "{changed}");
+        let sum: f64 = single.iter().map(|one| one["probability"].as_f64().unwrap()).sum();
+        assert!(sum <= 1.0 + 1e-9, "{sum}");
+    }
 }
 
 /// The history and its screen of ten sessions between which J5 moves by 40 µm; `changed` changes the file of a session.

@@ -63,8 +63,9 @@ fn each_method_identifies_all_eight_errors_with_the_set_up_priors() {
             let total: f64 = error.budget.iter().map(|part| part.share).sum();
             assert!((total - 1.0).abs() < 2e-3, "{chapter} {id}: shares come to {total}");
             let noise = error.budget.iter().find(|part| part.source == "noise").unwrap().u;
-            // The repeatability of the thesis lies between that of white noise of 0.3 µm and that of a new set-up.
-            assert!(noise < repeated[chapter - 4], "{chapter} {id}: {noise}");
+            // The repeatability of the thesis, printed with one or two digits, lies between that of white noise of 0.3 µm and
+            // that of a new set-up.
+            assert!(noise < 1.05 * repeated[chapter - 4], "{chapter} {id}: {noise}");
             assert!(u(&plan, id) > repeated[chapter - 4], "{chapter} {id}: {}", u(&plan, id));
         }
     }
