@@ -83,7 +83,8 @@ fn marked(summary: &Summary) -> Table {
 /// A warning if the tool point of the model is the target of the instrument, which no one stated and the fit placed.
 pub fn fitted_tool(model: &IdentifiedModel) -> Option<String> {
     let is_of_tool = |own: &ModelParameter| matches!(own.id.thing(), Some("target" | "spindle_ball"));
-    let free = |own: &&ModelParameter| is_of_tool(own) && own.prior_u.is_none() && !own.held;
+    // Its orientation does not move the point.
+    let free = |own: &&ModelParameter| is_of_tool(own) && own.unit == "um" && own.prior_u.is_none() && !own.held;
     let placed: Vec<String> = (model.parameters.iter().filter(free))
         .map(|own| format!("{} by {:.1} µm", own.id, own.value * own.display_per_internal))
         .collect();

@@ -277,6 +277,29 @@ fn the_comparison_of_a_robot_opens_with_the_joint_that_moved() {
     }
 }
 
+/// Corrected commands say that the fit placed the tool point, in lengths. A stated point, and a body of which the fit found the
+/// orientation alone, need no warning.
+#[test]
+fn a_tool_point_that_the_fit_placed_is_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let free = written(folder.path(), POSES, 1, &TARGETS[..1], [0.0; 2]);
+    let [model, commands, out] = ["model.json", "commands.csv", "out.csv"].map(|name| folder.path().join(name));
+    fs::write(&commands, "j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg\n10,20,-10,30,40,5\n").unwrap();
+    let tool = ["--tool-mm", "-1184,-349,12"];
+    for (session, tool, placed) in
+        [(&free, &[][..], true), (&free, &tool[..], false), (&ready("pose/session.toml"), &[][..], false)]
+    {
+        let run = abbe(&["fit", text(session), "--save", text(&model), "--quiet"]);
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        let fixed = ["compensate", text(&model), text(&commands), "--out", text(&out), "--force"];
+        let run = abbe(&[&fixed[..], tool].concat());
+        let said = String::from_utf8_lossy(&run.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(run.status.success(), "{said}");
+        assert_eq!(said.contains("which the fit placed (target.x[S] by "), placed, "{said}");
+        assert!(!said.contains("target.a"), "{said}");
+    }
+}
+
 /// The history and its screen of ten sessions between which J5 moves by 40 µm; `changed` changes the file of a session.
 fn history_of_a_drift(place: &Path, changed: impl Fn(u64, &str) -> String) -> (serde_json::Value, String) {
     let folder = place.join("fleet");

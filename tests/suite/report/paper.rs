@@ -126,12 +126,14 @@ fn the_folder_is_complete() {
         assert!(std::fs::read(out.join(format!("figures/{figure}.pdf"))).unwrap().starts_with(b"%PDF-1.4"));
         assert!(text(&format!("figures/{figure}.csv")).lines().count() > 1);
     }
-    // The pivot of chapter 4 is at R from C: EY0C changes the first test by R over the length of the bar.
+    // The pivot of the A tests of chapter 4 is on the A table: EY0C changes the tests of C alone.
     let equations = text("sections/equations.tex");
-    assert!(equations.contains("\\label{eq:ldbb-A100}") && equations.contains("R e_{y0c}"), "{equations}");
+    let (of_a, of_c) = equations.split_once("\\paragraph{Test C100}").unwrap();
+    assert!(of_a.contains("\\label{eq:ldbb-A100}") && !of_a.contains("e_{y0c}"), "{equations}");
+    assert!(of_c.contains("e_{y0c}"), "{equations}");
     // Comments of the session, such as tables of a source, are no words of a paper, nor are identifiers.
     assert!(!equations.contains("Table 3.1") && equations.contains("Symbol & Meaning & Unit"), "{equations}");
-    assert!(text("sections/equations.typ").contains("R e_\"y0c\""));
+    assert!(text("sections/equations.typ").contains("e_\"y0c\""));
     let budget = text("tables/budget.csv");
     assert!(budget.contains("spindle ball") && !budget.contains("spindle_ball"), "{budget}");
     for part in [
