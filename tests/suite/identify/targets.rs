@@ -295,7 +295,7 @@ fn a_tool_point_that_the_fit_placed_is_a_warning() {
         let run = abbe(&[&fixed[..], tool].concat());
         let said = String::from_utf8_lossy(&run.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(run.status.success(), "{said}");
-        assert_eq!(said.contains("which the fit placed (target.x[S] by "), placed, "{said}");
+        assert_eq!(said.contains("which the fit placed (target.x[T0] by "), placed, "{said}");
         assert!(!said.contains("target.a"), "{said}");
     }
 }
