@@ -410,6 +410,31 @@ impl Machine {
 /// Moment of a unit weight that is rounding, mm.
 const NO_MOMENT_MM: f64 = 1e-9;
 
+/// The origin of an axis, mm, unless it is that of its frame.
+#[derive(Clone, Copy)]
+struct OffOrigin([f64; 3]);
+
+// The coordinates one by one: `array::map` is not inlined in these functions.
+impl OffOrigin {
+    #[inline(always)]
+    fn of(axis: &Axis) -> Option<OffOrigin> {
+        let [x, y, z] = axis.origin_mm;
+        (x != 0.0 || y != 0.0 || z != 0.0).then_some(OffOrigin([x, y, z]))
+    }
+
+    #[inline(always)]
+    fn forth<N: Nominal>(self) -> [N; 3] {
+        let OffOrigin([x, y, z]) = self;
+        [N::constant(x), N::constant(y), N::constant(z)]
+    }
+
+    #[inline(always)]
+    fn back<N: Nominal>(self) -> [N; 3] {
+        let OffOrigin([x, y, z]) = self;
+        [N::constant(-x), N::constant(-y), N::constant(-z)]
+    }
+}
+
 /// Transforms a point from the moved side of an axis to its bed side.
 #[inline]
 fn push<S: Scalar>(
@@ -418,10 +443,8 @@ fn push<S: Scalar>(
     errors: &BodyErrors<S>,
     point: Point<S>,
 ) -> Point<S> {
-    let at_origin = axis.origin_mm == [0.0; 3];
-    let to_origin = axis.origin_mm.map(|o| S::Nominal::constant(-o));
-    let from_origin = axis.origin_mm.map(S::Nominal::constant);
-    let mut point = if at_origin { point } else { point.shifted(to_origin) };
+    let origin = OffOrigin::of(axis);
+    let mut point = origin.map_or(point, |origin| point.shifted(origin.back()));
     if axis.kind == AxisKind::Rotary {
         point = axis.rotate(position.turn, point);
     }
@@ -444,7 +467,7 @@ fn push<S: Scalar>(
             }
         }
     }
-    if at_origin { point } else { point.shifted(from_origin) }
+    origin.map_or(point, |origin| point.shifted(origin.forth()))
 }
 
 /// Transforms a point from the bed side of an axis to its moved side: the inverse of [`push`].
@@ -454,8 +477,8 @@ fn pull<S: Scalar>(
     errors: &BodyErrors<S>,
     point: Point<S>,
 ) -> Point<S> {
-    let at_origin = axis.origin_mm == [0.0; 3];
-    let mut point = if at_origin { point } else { point.shifted(axis.origin_mm.map(|o| S::Nominal::constant(-o))) };
+    let origin = OffOrigin::of(axis);
+    let mut point = origin.map_or(point, |origin| point.shifted(origin.back()));
     if axis.kind == AxisKind::Linear {
         for i in 0..3 {
             if let Some(along) = travel::<S>(axis, position, i) {
@@ -479,7 +502,7 @@ fn pull<S: Scalar>(
         let back = SinCos { sin: -position.turn.sin, cos: position.turn.cos };
         point = axis.rotate(back, point);
     }
-    if at_origin { point } else { point.shifted(axis.origin_mm.map(S::Nominal::constant)) }
+    origin.map_or(point, |origin| point.shifted(origin.forth()))
 }
 
 /// Displacement by a linear axis along coordinate `i`; `None` if its direction has no component there.

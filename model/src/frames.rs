@@ -16,7 +16,8 @@ impl<S: Scalar> Point<S> {
     /// A nominal point, with derivatives of zero.
     #[inline(always)]
     pub fn nominal(coordinates: [S::Nominal; 3]) -> Self {
-        Point(coordinates.map(S::nominal))
+        let [x, y, z] = coordinates;
+        Point([S::nominal(x), S::nominal(y), S::nominal(z)])
     }
 
     /// `self + other`.

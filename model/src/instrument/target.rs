@@ -38,10 +38,11 @@ impl<N: Nominal> Target<N> {
     /// In its frame, displaced by three parameters from the first on, if they are included.
     #[inline]
     pub fn displaced<S: Scalar<Nominal = N>>(&self, first: usize, unknown: &impl Fn(usize) -> Option<S>) -> Point<S> {
-        Point(std::array::from_fn(|i| match unknown(first + i) {
+        let coordinate = |i: usize| match unknown(first + i) {
             Some(displacement) => displacement + self.mm[i],
             None => S::nominal(self.mm[i]),
-        }))
+        };
+        Point([coordinate(0), coordinate(1), coordinate(2)])
     }
 
     /// In R, displaced as by [`Target::displaced`].
