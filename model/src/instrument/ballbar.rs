@@ -220,12 +220,11 @@ impl Instrument for BallBar<f64> {
     }
     /// The distance between the balls is the length of the bar.
     fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {
-        let mut deviations: Vec<f64> = Vec::with_capacity(checked.readings.rows());
+        let mut deviations = checked.nominal(Station::BallBar(self.clone()));
         let mut farthest = (0, 0.0_f64);
-        for (row, reading) in checked.nominal(self).enumerate() {
-            let length = reading.channels()[0];
+        for (row, length) in deviations.iter_mut().enumerate() {
             // A length of zero has no direction, so that no error changes it to first order.
-            if length < MIN_MM {
+            if *length < MIN_MM {
                 return Err((
                     format!(
                         "test \"{}\", reading {}: the two balls nominally coincide, but the bar is {:e} mm long",
@@ -236,9 +235,9 @@ impl Instrument for BallBar<f64> {
                     "check `bar_mm`, the two ball positions and the axis positions in `at` and the data".into(),
                 ));
             }
-            deviations.push(length - self.bar);
-            if (length - self.bar).abs() > farthest.1 {
-                farthest = (row, (length - self.bar).abs());
+            *length -= self.bar;
+            if length.abs() > farthest.1 {
+                farthest = (row, length.abs());
             }
         }
         let nominal = self.bar + median(&mut deviations);
@@ -265,8 +264,7 @@ impl Instrument for BallBar<f64> {
     }
     /// The bar reaches at every position of a plan.
     fn check_planned(&self, checked: &Checked<'_>) -> Result<(), Fault> {
-        let apart = |reading: Reading<f64>| reading.channels()[0];
-        let off = checked.nominal(self).map(apart).enumerate();
+        let off = checked.nominal(Station::BallBar(self.clone())).into_iter().enumerate();
         let farthest = off.max_by(|(_, a), (_, b)| (a - self.bar).abs().total_cmp(&(b - self.bar).abs()));
         let Some((row, apart)) = farthest.filter(|(_, apart)| (apart - self.bar).abs() > MAX_MM) else {
             return Ok(());

@@ -153,8 +153,7 @@ impl Instrument for Distance<f64> {
     }
     /// The reflector is nominally not at the station.
     fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {
-        for (row, reading) in checked.nominal(self).enumerate() {
-            let distance = reading.channels()[0];
+        for (row, distance) in checked.nominal(Station::Distance(self.clone())).into_iter().enumerate() {
             if distance < MIN_MM {
                 return Err((
                     format!(

@@ -9,12 +9,13 @@ use super::operation::{Aligned, Contact, Following, Handling, Travel};
 use super::set_up::{self, SetUp, Stated};
 use super::target::Target;
 use super::{InstrumentKind, InstrumentParameter, Reading, SharedBy, Station};
-use crate::chain::{AxisPosition, BodyErrors, Frame, Machine, MachineState};
+use crate::chain::{AxisPosition, Frame, Machine, MachineState};
 use crate::component::ErrorName;
 use crate::document::Fault as KeyFault;
 use crate::document::node::Node;
 use crate::rotation_error::Body;
 use crate::scalar::{Nominal, Scalar};
+use crate::sensitivity::{SlotValues, TestModel};
 use crate::session::Prior;
 use crate::session::expression::Constant;
 use crate::session::readings::Readings;
@@ -185,15 +186,10 @@ pub struct Checked<'a> {
 }
 
 impl Checked<'_> {
-    /// The nominal reading of every row, mm.
-    pub(super) fn nominal<G: Geometry<f64>>(&self, geometry: &G) -> impl Iterator<Item = Reading<f64>> {
-        let none = vec![BodyErrors::<f64>::NONE; self.machine.axes.len()];
-        let mut state = Vec::new();
-        (0..self.readings.rows()).map(move |row| {
-            self.readings.state(self.machine, row, &mut state);
-            let at = MachineState { machine: self.machine, state: &state, errors: &none };
-            geometry.reading::<f64>(at, |_| None)
-        })
+    /// The nominal values of the channels of every row, mm or rad, row after row.
+    pub(super) fn nominal(&self, station: Station<f64>) -> Vec<f64> {
+        let model = TestModel::new(self.machine.clone(), station, self.readings);
+        model.readings(&SlotValues::zero(model.slots()))
     }
 
     /// Where the axes are at a row that move during the test, or all if none does: `c_deg = 30`.

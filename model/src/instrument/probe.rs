@@ -289,8 +289,7 @@ impl Instrument for Probe<f64> {
     }
     /// The stylus is in front of the artefact and near it at every reading.
     fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {
-        for (row, reading) in checked.nominal(self).enumerate() {
-            let distance = reading.channels()[0];
+        for (row, distance) in checked.nominal(Station::Probe(self.clone())).into_iter().enumerate() {
             if distance.abs() <= MAX_MM {
                 continue;
             }

@@ -407,8 +407,9 @@ impl Instrument for RTest<f64> {
     }
     /// The master ball is nominally in the nest at every reading.
     fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {
-        for (row, reading) in checked.nominal(self).enumerate() {
-            let apart = reading.channels().iter().map(|x| x * x).sum::<f64>().sqrt();
+        let nominal = checked.nominal(Station::RTest(self.clone()));
+        for (row, values) in nominal.chunks_exact(self.channels().len()).enumerate() {
+            let apart = values.iter().map(|x| x * x).sum::<f64>().sqrt();
             if apart > MAX_MM {
                 return Err((
                     format!(
