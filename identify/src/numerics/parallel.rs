@@ -21,6 +21,18 @@ pub fn map<T: Send>(count: usize, of: &(dyn Fn(usize) -> T + Sync)) -> Vec<T> {
     results.into_iter().filter_map(|result| result.into_inner().ok().flatten()).collect()
 }
 
+/// Items of one thread that are computed before their results are taken.
+const ITEMS_OF_A_THREAD: usize = 8;
+
+/// `put(0, of(0))`, `put(1, of(1))`, … in order, for large results: those of few items are held at the same time.
+pub fn in_order<T: Send>(count: usize, of: &(dyn Fn(usize) -> T + Sync), put: &mut dyn FnMut(usize, T)) {
+    let at_once = ITEMS_OF_A_THREAD * rayon::current_num_threads();
+    for first in (0..count).step_by(at_once) {
+        let results = map(at_once.min(count - first), &|k| of(first + k));
+        results.into_iter().enumerate().for_each(|(k, result)| put(first + k, result));
+    }
+}
+
 /// Two independent computations at the same time.
 pub fn both<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
     rayon::join(a, b)
@@ -35,5 +47,8 @@ mod tests {
         let squares = map(1000, &|index| map(index % 5, &|inner| inner).len() + index * index);
         assert!(squares.iter().enumerate().all(|(index, square)| *square == index * index + index % 5));
         assert!(map(0, &|index| index).is_empty());
+        let mut taken = Vec::new();
+        in_order(1000, &|index| index * index, &mut |index, square| taken.push((index, square)));
+        assert!(taken.iter().enumerate().all(|(place, taken)| *taken == (place, place * place)) && taken.len() == 1000);
     }
 }

@@ -212,7 +212,7 @@ impl Layout {
                 }
             }
         }
-        let results = parallel::map(tasks.len(), &|k| {
+        let formed = |k: usize| {
             should_continue().then(|| {
                 let local = &local[tasks[k].group];
                 match &tasks[k].work {
@@ -220,38 +220,46 @@ impl Layout {
                     Work::Squares => Formed::Squares(self.squares_of(&tasks[k], local, training)),
                 }
             })
-        });
+        };
         let mut products = Products {
             side: Mat::zeros(vectors, self.total()),
             own: vec![0.0; if with_own { self.square[self.square.len() - 1] } else { 0 }],
         };
-        for (task, result) in tasks.iter().zip(results) {
-            let members = self.groups[task.group].chunks[task.chunks.clone()].iter().flatten();
-            match result? {
-                Formed::Sums(sums) => {
-                    let mut column = 0;
-                    for member in members {
-                        for (channel, candidate) in member.users_of(&task.channels) {
-                            let first = (channel - task.channels.start) * vectors;
-                            for (k, to) in self.columns(candidate).enumerate() {
-                                let from = &sums.col_as_slice(column + k)[first..first + vectors];
-                                let to = products.side.col_as_slice_mut(to);
-                                to.iter_mut().zip(from).for_each(|(to, from)| *to += from);
-                            }
+        let mut is_complete = true;
+        parallel::in_order(tasks.len(), &formed, &mut |k, formed| match formed {
+            Some(formed) => self.add(&tasks[k], formed, &mut products),
+            None => is_complete = false,
+        });
+        is_complete.then_some(products)
+    }
+
+    /// Adds what a task has formed.
+    fn add(&self, task: &Task, formed: Formed, products: &mut Products) {
+        let vectors = products.side.nrows();
+        let members = self.groups[task.group].chunks[task.chunks.clone()].iter().flatten();
+        match formed {
+            Formed::Sums(sums) => {
+                let mut column = 0;
+                for member in members {
+                    for (channel, candidate) in member.users_of(&task.channels) {
+                        let first = (channel - task.channels.start) * vectors;
+                        for (k, to) in self.columns(candidate).enumerate() {
+                            let from = &sums.col_as_slice(column + k)[first..first + vectors];
+                            let to = products.side.col_as_slice_mut(to);
+                            to.iter_mut().zip(from).for_each(|(to, from)| *to += from);
                         }
-                        column += member.basis.ncols();
                     }
+                    column += member.basis.ncols();
                 }
-                Formed::Squares(squares) => {
-                    let mut squares = squares.into_iter();
-                    for (_, candidate) in members.flat_map(|member| member.users_of(&task.channels)) {
-                        let to = products.own[self.squares(candidate)].iter_mut();
-                        to.zip(&mut squares).for_each(|(to, square)| *to = square);
-                    }
+            }
+            Formed::Squares(squares) => {
+                let mut squares = squares.into_iter();
+                for (_, candidate) in members.flat_map(|member| member.users_of(&task.channels)) {
+                    let to = products.own[self.squares(candidate)].iter_mut();
+                    to.zip(&mut squares).for_each(|(to, square)| *to = square);
                 }
             }
         }
-        Some(products)
     }
 
     /// The products of the columns of a task with the vectors over some states: vectors of each channel × columns.
