@@ -13,14 +13,14 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use abbe_model::axis::AxisKind;
-use abbe_model::chain::Machine;
+use abbe_model::chain::{Frame, Machine};
 use abbe_model::session::Test;
 use abbe_model::session::placing::{axis_line, balls};
 use nalgebra::Vector3;
 
 use super::names;
 use super::path::{MovingAxes, Path};
-use super::polar::{Centre, PolarPath, mean, width_mm};
+use super::polar::{Centre, Mean, PolarPath, mean};
 use super::results::{CircularTest, DirectionFigures};
 use super::set_up::{FigureUncertainties, SetUp};
 use crate::figure::{Definition, Figure, IN_BOTH_DIRECTIONS, IN_ONE_DIRECTION};
@@ -59,7 +59,7 @@ pub(super) fn figures(machine: &Arc<Machine>, test: &Test, path: &Path) -> Circu
     }
     // Both directions as one path: those there, then those back.
     let both = match &traces {
-        [Some((there, _)), Some((back, _))] => {
+        [Some(Mean { path: there, .. }), Some(Mean { path: back, .. })] => {
             let both = PolarPath(there.0.iter().chain(&back.0).copied().collect());
             let (centre, deviations_mm) = radial_deviations_mm(path, &both);
             Some((both, centre, deviations_mm, there.0.len()))
@@ -70,7 +70,7 @@ pub(super) fn figures(machine: &Arc<Machine>, test: &Test, path: &Path) -> Circu
         .iter()
         .zip([("+", 1.0), ("-", -1.0)])
         .filter_map(|(trace, (direction, sign))| {
-            let (trace, runs) = trace.as_ref()?;
+            let Mean { path: trace, runs, width_mm } = trace.as_ref()?;
             let (_, deviations_mm) = radial_deviations_mm(path, trace);
             let [least, most] = ends(&deviations_mm);
             // The circle through both directions may be nearer to the minimum zone of one than its own.
@@ -79,7 +79,7 @@ pub(super) fn figures(machine: &Arc<Machine>, test: &Test, path: &Path) -> Circu
                 range(if sign > 0.0 { one } else { other })
             });
             let u = FigureUncertainties::of(path, trace, &deviations_mm, &set_up);
-            let width_mm = if is_error_motion { width_mm(path, sign) } else { None };
+            let width_mm = width_mm.filter(|_| is_error_motion);
             let values = [
                 Some(((most - least).min(about_both) * 1e3, u.range_um)),
                 Some((most * 1e3, u.max_um)),
@@ -93,10 +93,12 @@ pub(super) fn figures(machine: &Arc<Machine>, test: &Test, path: &Path) -> Circu
         })
         .collect();
     let mut figures = Vec::new();
-    if let ([Some((there, _)), Some((back, _))], Some((both, centre, deviations_mm, _))) = (&traces, &both) {
+    if let ([Some(there), Some(back)], Some((both, centre, deviations_mm, _))) = (&traces, &both) {
         let [least, most] = ends(deviations_mm);
         let u = FigureUncertainties::of(path, both, deviations_mm, &set_up);
-        let differences = there.0.iter().filter_map(|p| Some((p.deviation_mm - back.at(p.angle)?).abs()));
+        let mut place = 0;
+        let differences =
+            there.path.0.iter().filter_map(|p| Some((p.deviation_mm - back.path.at(p.angle, &mut place)?).abs()));
         let values = [
             Some(((most - least) * 1e3, u.range_um)),
             Some((centre.radius_mm * 1e3, u.mean_um)),
@@ -154,15 +156,29 @@ fn bar_is_radial(machine: &Machine, test: &Test, axis: usize) -> bool {
     let (Some(bar), Some(readings)) = (test.station.bar(), &test.readings) else {
         return false;
     };
-    let state = |row: usize| -> Vec<f64> { readings.positions.iter().map(|column| column[row]).collect() };
-    let (origin, direction) = axis_line(machine, &state(0), axis);
+    let at: Vec<f64> = readings.positions.iter().filter_map(|column| column.first().copied()).collect();
+    if at.len() < machine.axes.len() {
+        return false;
+    }
+    let (origin, direction) = axis_line(machine, &at, axis);
     let [origin, direction] = [origin, direction].map(Vector3::from);
-    (0..readings.rows()).all(|row| {
-        let (workpiece, spindle) = balls(machine, bar, &state(row));
-        let [workpiece, spindle] = [workpiece, spindle].map(Vector3::from);
-        let from_axis = |ball: Vector3<f64>| (ball - origin) - direction * direction.dot(&(ball - origin));
-        let (one, other) = (from_axis(workpiece), from_axis(spindle));
-        let radius = if one.norm() > other.norm() { one } else { other };
-        (spindle - workpiece).dot(&radius).abs() >= RADIAL * (spindle - workpiece).norm() * radius.norm()
+    let (workpiece, spindle) = balls(machine, bar, &at);
+    let from_axis = |ball: [f64; 3]| {
+        let ball = Vector3::from(ball) - origin;
+        (ball - direction * direction.dot(&ball), direction.dot(&ball))
+    };
+    let ((one, height), (other, other_height)) = (from_axis(workpiece), from_axis(spindle));
+    // Only this axis moves: a ball that it carries turns about its line, and another one rests.
+    let turns = |frame: Frame| machine.carriers(frame).any(|carrier| carrier == axis);
+    let [one_turns, other_turns] = [bar.workpiece_ball.frame, bar.spindle_ball.frame].map(turns);
+    let [one_across, other_across] = [direction.cross(&one), direction.cross(&other)];
+    readings.positions[axis].iter().all(|position| {
+        let (sin, cos) = (position - at[axis]).sin_cos();
+        let one = if one_turns { one * cos + one_across * sin } else { one };
+        let other = if other_turns { other * cos + other_across * sin } else { other };
+        let radius = if one.norm_squared() > other.norm_squared() { one } else { other };
+        let across = other - one;
+        let bar = across.norm_squared() + (other_height - height).powi(2);
+        across.dot(&radius).abs() >= RADIAL * (bar * radius.norm_squared()).sqrt()
     })
 }

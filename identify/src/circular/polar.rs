@@ -6,7 +6,6 @@ use num_dual::DualNum;
 
 use super::path::{MovingAxes, Path};
 use crate::numerics::circle::{self, Circle};
-use crate::numerics::range;
 
 /// A reading, or the mean of the readings of several runs at one angle.
 #[derive(Clone, Copy, Debug)]
@@ -47,32 +46,43 @@ fn in_direction(path: &Path, direction: f64) -> Vec<PolarPath> {
     .collect()
 }
 
-/// The greatest range of the runs in one direction at one angle of the first run, mm; `None` for a single run.
-pub(super) fn width_mm(path: &Path, direction: f64) -> Option<f64> {
-    let runs = in_direction(path, direction);
-    let (first, others) = runs.split_first().filter(|(_, others)| !others.is_empty())?;
-    let widths = first.0.iter().map(|p| {
-        let deviations: Vec<f64> = others.iter().filter_map(|run| run.at(p.angle)).chain([p.deviation_mm]).collect();
-        range(&deviations)
-    });
-    widths.reduce(f64::max)
+/// The runs in one direction together.
+pub(super) struct Mean {
+    /// Their mean path, at the angles of the first run.
+    pub path: PolarPath,
+    /// Their number.
+    pub runs: usize,
+    /// The greatest range of the runs at one of these angles, mm; `None` for a single run.
+    pub width_mm: Option<f64>,
 }
 
-/// The mean path of the runs in one direction, at the angles of the first run, and the number of these runs.
-pub(super) fn mean(path: &Path, direction: f64) -> Option<(PolarPath, usize)> {
+/// The mean path of the runs in one direction.
+pub(super) fn mean(path: &Path, direction: f64) -> Option<Mean> {
     let runs = in_direction(path, direction);
-    let first = runs.first()?;
+    let (first, others) = runs.split_first()?;
+    let mut places = vec![0; others.len()];
+    let mut widths = Vec::with_capacity(first.0.len());
     let points = first.0.iter().map(|p| {
-        let others: Vec<f64> = runs[1..].iter().filter_map(|run| run.at(p.angle)).collect();
-        let sum = p.deviation_mm + others.iter().sum::<f64>();
-        PolarPoint { deviation_mm: sum / (1 + others.len()) as f64, ..*p }
+        let (mut sum, mut count, mut least, mut most) = (0.0, 1, p.deviation_mm, p.deviation_mm);
+        for (run, place) in others.iter().zip(&mut places) {
+            if let Some(deviation_mm) = run.at(p.angle, place) {
+                sum += deviation_mm;
+                count += 1;
+                (least, most) = (least.min(deviation_mm), most.max(deviation_mm));
+            }
+        }
+        widths.push(most - least);
+        PolarPoint { deviation_mm: (p.deviation_mm + sum) / f64::from(count), ..*p }
     });
-    Some((PolarPath(points.collect()), runs.len()))
+    let path = PolarPath(points.collect());
+    let width_mm = widths.into_iter().reduce(f64::max).filter(|_| !others.is_empty());
+    Some(Mean { path, runs: runs.len(), width_mm })
 }
 
 impl PolarPath {
-    /// The deviation at an angle (modulo whole turns), interpolated between the neighbouring readings.
-    pub fn at(&self, angle: f64) -> Option<f64> {
+    /// The deviation at an angle (modulo whole turns), interpolated between the neighbouring readings. `place` is that of
+    /// the angle before, near which the search begins.
+    pub fn at(&self, angle: f64, place: &mut usize) -> Option<f64> {
         const SAME: f64 = 1e-6;
         let points = &self.0;
         let (first, last) = (points.first()?.angle, points.last()?.angle);
@@ -81,7 +91,11 @@ impl PolarPath {
         if angle > last + SAME {
             return None;
         }
-        let next = points.partition_point(|p| p.angle < angle).min(points.len() - 1);
+        let is_before = |k: usize| points.get(k).is_some_and(|p| p.angle < angle);
+        let is_there = |k: &usize| !is_before(*k) && (*k == 0 || is_before(*k - 1));
+        let near = [*place, *place + 1].into_iter().find(is_there);
+        *place = near.unwrap_or_else(|| points.partition_point(|p| p.angle < angle));
+        let next = (*place).min(points.len() - 1);
         if next == 0 {
             return Some(points[0].deviation_mm);
         }
