@@ -9,7 +9,7 @@ use faer::Mat;
 use super::{Problem, RowBlock};
 use crate::numerics::parallel;
 use crate::numerics::products::{Products, RowSum};
-use crate::numerics::triangle::Triangle;
+use crate::numerics::triangle::{BLOCK_ROWS, Triangle};
 
 /// Sums of rows over the parameters of each test, by test and fold.
 type SumsByTestAndFold<S> = BTreeMap<(usize, usize), S>;
@@ -19,6 +19,13 @@ const BLOCKS_OF_FACTORS: usize = 16;
 const BLOCKS_OF_PRODUCTS: usize = 4;
 /// Number of tasks whose sums are held at the same time: with hundreds of parameters each has many MB.
 const SEGMENTS_AT_ONCE: usize = 64;
+
+/// Some rows of a block.
+struct Piece {
+    block: RowBlock,
+    /// The number of rows at its start that only whiten those after them.
+    lead: usize,
+}
 
 impl Problem {
     /// The triangular factor of each fold at the parameters `beta`, in internal units of the parameters.
@@ -40,11 +47,11 @@ impl Problem {
     fn sums_of_folds<S: RowSum>(&self, beta: &[f64], blocks_per_segment: usize) -> Result<Vec<S>, Diagnostic> {
         let values = self.slot_values(beta);
         // Segments have a fixed length, so that the sums do not depend on the number of threads.
-        let blocks = self.blocks();
-        let segments: Vec<&[RowBlock]> = blocks.chunks(blocks_per_segment).collect();
+        let pieces: Vec<Piece> = self.blocks().iter().flat_map(|block| self.pieces(block)).collect();
+        let segments: Vec<&[Piece]> = pieces.chunks(blocks_per_segment).collect();
         let mut sums = BTreeMap::<(usize, usize), Vec<S>>::new();
         for together in segments.chunks(SEGMENTS_AT_ONCE) {
-            let of_segments = parallel::map(together.len(), &|k| self.sums_of_blocks::<S>(&values, together[k]));
+            let of_segments = parallel::map(together.len(), &|k| self.sums_of_pieces::<S>(&values, together[k]));
             for of_segment in of_segments {
                 of_segment?.into_iter().for_each(|(place, own)| sums.entry(place).or_default().push(own));
             }
@@ -63,21 +70,33 @@ impl Problem {
         }))
     }
 
-    /// The sums of the rows of some blocks over the parameters of their tests, by test and fold.
-    fn sums_of_blocks<S: RowSum>(
+    /// A block in pieces that a factor absorbs at once. A whitening filter needs the rows before a piece too.
+    fn pieces(&self, block: &RowBlock) -> impl Iterator<Item = Piece> {
+        let RowBlock { test, rows } = block.clone();
+        let past = self.noise.ar_coefficients.len();
+        let most = (BLOCK_ROWS / self.channels(test)).max(1);
+        rows.clone().step_by(most).map(move |start| {
+            let lead = past.min(start - rows.start);
+            Piece { block: RowBlock { test, rows: start - lead..(start + most).min(rows.end) }, lead }
+        })
+    }
+
+    /// The sums of the rows of some pieces over the parameters of their tests, by test and fold.
+    fn sums_of_pieces<S: RowSum>(
         &self,
         values: &[SlotValues],
-        blocks: &[RowBlock],
+        pieces: &[Piece],
     ) -> Result<SumsByTestAndFold<S>, Diagnostic> {
         let mut sums = SumsByTestAndFold::<S>::new();
-        let (most_rows, most_columns) = (blocks.iter().map(|block| self.shape(block)))
+        let (most_rows, most_columns) = (pieces.iter().map(|piece| self.shape(&piece.block)))
             .fold((0, 0), |most, (rows, columns)| (most.0.max(rows), most.1.max(columns)));
         let mut memory = Mat::zeros(most_rows, most_columns);
-        for block in blocks {
+        for Piece { block, lead } in pieces {
             let (count, columns) = self.shape(block);
             let mut rows = memory.get_mut(..count, ..columns);
             self.own_rows_into(&values[block.test], block, rows.as_mut())?;
-            let kept = self.kept_rows(block);
+            let mut kept = self.kept_rows(block);
+            kept.drain(..kept.partition_point(|row| *row < lead * self.channels(block.test)));
             let folds: Vec<usize> = self.folds_of(&kept, block).collect();
             self.whiten_in_place(rows.as_mut(), &kept);
             let rows = rows.as_ref().get(..kept.len(), ..);

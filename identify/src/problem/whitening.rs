@@ -88,13 +88,13 @@ impl Problem {
         let innovation = 1.0 / (self.noise.innovation_mm() * inflation);
         let marginal = 1.0 / self.noise.likelihood_mm();
         let past = ar_coefficients.len().min(rows.nrows());
+        let mut before = vec![0.0; if past > 0 { rows.nrows() } else { 0 }];
         for column in rows.col_iter_mut().filter_map(|column| Some(column.try_as_col_major_mut()?.as_slice_mut())) {
-            if past > 0 {
-                // From the last row on, so that the rows before it are not whitened yet.
-                for i in (past..column.len()).rev() {
-                    let lags = ar_coefficients.iter().enumerate();
-                    column[i] -= lags.map(|(lag, a)| a * column[i - lag - 1]).sum::<f64>();
-                }
+            // One coefficient after the other, so that the compiler can vectorise the loops.
+            before.iter_mut().zip(&*column).for_each(|(before, value)| *before = *value);
+            for (lag, a) in (1..).zip(ar_coefficients) {
+                let earlier = &before[past - lag.min(past)..];
+                column[past..].iter_mut().zip(earlier).for_each(|(value, earlier)| *value -= a * earlier);
             }
             column[past..].iter_mut().for_each(|value| *value *= innovation);
             column[..past].iter_mut().for_each(|value| *value *= marginal);
