@@ -39,7 +39,15 @@ impl Linearisation {
     /// # Errors
     /// If the model cannot be evaluated.
     pub fn of(problem: &Problem, beta: &[f64]) -> Result<Linearisation, Diagnostic> {
-        let tests = problem.triangles(beta)?;
+        Linearisation::of_triangles(problem, beta, problem.triangles(beta)?)
+    }
+
+    /// The same from the triangular factors of the folds there.
+    pub(crate) fn of_triangles(
+        problem: &Problem,
+        beta: &[f64],
+        tests: Vec<Triangle>,
+    ) -> Result<Linearisation, Diagnostic> {
         let prior = problem.prior_triangle(beta);
         let size = problem.parameters.sizes();
         let readings = Triangle::new(size.len()).merged(&tests);

@@ -295,6 +295,7 @@ impl Problem {
     }
 
     /// Whether a scalar reading of a test was read and is not excluded.
+    #[inline(always)]
     pub fn counts(&self, test: usize, scalar: usize) -> bool {
         let row = match self.channels(test) {
             1 => scalar,
@@ -304,6 +305,7 @@ impl Problem {
     }
 
     /// Whether a scalar reading of a test was not read.
+    #[inline]
     pub(crate) fn is_missing(&self, test: usize, scalar: usize) -> bool {
         self.missing[test].get(scalar) == Some(&true)
     }

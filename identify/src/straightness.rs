@@ -47,6 +47,9 @@ pub fn of_session(session: &Session, left_out: &[Vec<bool>]) -> Vec<Straightness
 
 fn of_test(session: &Session, test: &Test, left_out: &[bool]) -> Vec<StraightnessTest> {
     let machine = &session.machine;
+    if !(0..test.station.channels().len()).any(|place| test.station.is_straightness(place)) {
+        return Vec::new();
+    }
     let Some((axis, readings)) = positioning::moved_axis(machine, test).zip(test.readings.as_ref()) else {
         return Vec::new();
     };

@@ -30,7 +30,7 @@ use abbe_model::words::listed;
 use faer::Mat;
 
 use crate::heldout::{HeldOut, held_out};
-use crate::noise::{NoiseSource, PureError, ShownNoise};
+use crate::noise::{NoiseSource, Repeatability, ShownNoise};
 use crate::numerics::least_squares::{LeastSquares, Scaling, minimise};
 use crate::numerics::rank::Rank;
 use crate::numerics::tails::residual_tail;
@@ -62,8 +62,12 @@ pub struct Fit {
     pub covariance: Mat<f64>,
     /// The triangular factors of the folds at the solution.
     pub triangles: Vec<Triangle>,
+    /// Those at the nominal machine, if the fit has decided its rank there.
+    pub nominal: Option<Vec<Triangle>>,
     /// Residuals by test, mm.
     pub residuals: Vec<Vec<f64>>,
+    /// What repeats show at these residuals, if the search for the noise has computed it.
+    pub repeats: Option<Repeatability>,
     /// Held-out residuals.
     pub held_out: HeldOut,
     /// χ², with each prior as an observation.
@@ -161,6 +165,8 @@ pub struct Minimum {
     pub triangles: Vec<Triangle>,
     /// The rank at the nominal machine, or at `beta` where it is larger.
     pub rank: Rank,
+    /// The triangular factors of the folds at the nominal machine, if they decided the rank of all parameters.
+    pub nominal: Option<Vec<Triangle>>,
 }
 
 /// Singular value at the solution, in standard deviations per physical size, from which a direction is identifiable that
@@ -191,10 +197,10 @@ fn minimum_beside(problem: &Problem, start: Option<&[f64]>, before: Option<&Fit>
         Some(before) => Some(rank_at(problem, &in_sizes(problem, &before.beta))?),
         None => None,
     };
-    let (rank, linearised) = match again.filter(|(rank, _)| is_determined(rank)) {
-        Some(again) => again,
-        None => rank_at_nominal(problem)?,
-    };
+    let again = again.filter(|(rank, _)| is_determined(rank));
+    let is_nominal = again.is_none() && !has_families;
+    let (rank, linearised) = again.map_or_else(|| rank_at_nominal(problem), Ok)?;
+    let nominal = is_nominal.then(|| linearised.1.clone());
     let mut found = minimum_of_rank(problem, rank, linearised, start)?;
     for _ in 0..MAX_RANKS {
         let is_full = found.rank.null_space.ncols() == 0;
@@ -223,7 +229,7 @@ fn minimum_beside(problem: &Problem, start: Option<&[f64]>, before: Option<&Fit>
         }
         found = further;
     }
-    Ok(found)
+    Ok(Minimum { nominal, ..found })
 }
 
 /// The same in the identifiable directions of a rank. `linearised` are parameters and their triangular factors.
@@ -252,7 +258,7 @@ fn minimum_of_rank(
     // After the last linearisation the parameters move by a step at which nonlinearity is negligible.
     let step: Vec<f64> = beta.iter().zip(&last).map(|(end, last)| end - last).collect();
     let triangles = triangles.iter().map(|triangle| triangle.after(&step)).collect();
-    Ok(Minimum { beta, triangles, rank })
+    Ok(Minimum { beta, triangles, rank, nominal: None })
 }
 
 /// Degrees of freedom of χ². Each prior counts as an observation.
@@ -299,7 +305,7 @@ fn identifiable(problem: &Problem, beta: &[f64]) -> Result<Vec<f64>, Diagnostic>
 
 /// Computes covariance, residuals, cross-validation and χ² at the solution.
 fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, Diagnostic> {
-    let Minimum { beta, triangles, rank } = minimum;
+    let Minimum { beta, triangles, rank, nominal } = minimum;
     let whole = problem.prior_triangle(&beta).merged(&triangles);
     let covariance = whole.covariance(&rank.identifiable_basis)?;
     let (residuals, held_out) = held_out(problem, &beta, &triangles, &whole, &rank.identifiable_basis)?;
@@ -316,7 +322,9 @@ fn finish(problem: &Problem, minimum: Minimum) -> Result<Fit, Diagnostic> {
         rank,
         covariance,
         triangles,
+        nominal,
         residuals,
+        repeats: None,
         held_out,
         chi_square,
         degrees_of_freedom,
@@ -346,7 +354,7 @@ impl Fit {
 fn freedom_of_noise(problem: &Problem, residuals: &[Vec<f64>]) -> Option<usize> {
     let kept = |test: usize, row: usize| !problem.rejected[test][row];
     match problem.noise.source {
-        NoiseSource::Repeats => Some(PureError::of(&problem.tests, residuals, kept).freedom),
+        NoiseSource::Repeats => Some(Repeatability::of(problem, residuals).freedom),
         NoiseSource::Targets => ShownNoise::of(&problem.tests, residuals, kept).map(|shown| shown.freedom),
         _ => None,
     }

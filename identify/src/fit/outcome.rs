@@ -61,12 +61,15 @@ pub(crate) fn ratio_of_another_unit(problem: &Problem, fit: &Fit) -> Option<f64>
 /// The doubt about readings without a stated noise whose size such an instrument does not have, as in another unit. Their repeats
 /// are in the same unit and show nothing.
 pub(crate) fn doubt_on_unit(problem: &Problem) -> Option<String> {
+    if problem.session.stated_noise_mm().is_some() {
+        return None;
+    }
     let machine = &problem.session.machine;
     let doubt =
         |test: &Test| test.station.doubt(&Checked { machine, test: &test.name, readings: test.readings.as_deref()? });
     // What is doubtful of a line of sight is no unit.
     let has_unit = |test: &&Test| test.station.kind() != InstrumentKind::Pointing;
-    problem.tests.iter().filter(has_unit).find_map(doubt).filter(|_| problem.session.stated_noise_mm().is_none())
+    problem.tests.iter().filter(has_unit).find_map(doubt)
 }
 
 /// What determines each parameter of a problem, by index, and the errors that set-up priors determine, in words.
@@ -80,8 +83,8 @@ impl Determined {
     ///
     /// # Errors
     /// If the model cannot be evaluated.
-    pub fn of(problem: &Problem, rank: &Rank) -> Result<Determined, Diagnostic> {
-        let list = &problem.parameters.list;
+    pub fn of(problem: &Problem, fit: &Fit) -> Result<Determined, Diagnostic> {
+        let (list, rank) = (&problem.parameters.list, &fit.rank);
         let of_null_space = |j: usize| {
             let own: Vec<&Vec<f64>> = rank.null_combinations.iter().filter(|row| row[j] != 0.0).collect();
             match own.iter().any(|row| row.iter().filter(|share| **share != 0.0).count() > 1) {
@@ -98,7 +101,13 @@ impl Determined {
         }
         // Priors of families determine their coefficients. They are no statement about the set-up.
         let (problem, kept) = problem.without_families();
-        let linear = Linearisation::of(&problem, &vec![0.0; kept.len()])?;
+        let nominal = vec![0.0; kept.len()];
+        // The columns of numbers and positions of shapes follow these.
+        let is_fixed = !problem.parameters.has_numbers() && problem.parameters.positions().next().is_none();
+        let linear = match fit.nominal.as_ref().filter(|_| is_fixed) {
+            Some(triangles) => Linearisation::of_triangles(&problem, &nominal, triangles.clone())?,
+            None => Linearisation::of(&problem, &nominal)?,
+        };
         let alone = Rank::decide(&linear.readings, &linear.size, &linear.preference)?;
         for (k, j) in kept.iter().enumerate() {
             let of_interest = is_of_interest(&list[*j]) || list[*j].id.is_number();
@@ -149,7 +158,7 @@ pub(super) fn outcome(problem: &Problem, fit: &Fit, goodness: Goodness, determin
 
 /// What a fit assumes, each with its test by the readings.
 fn assumptions(problem: &Problem, fit: &Fit) -> Vec<Assumption> {
-    let mut list = vec![noise(problem, stated_against_repeats(problem, &fit.residuals))];
+    let mut list = vec![noise(problem, stated_against_repeats(problem, fit))];
     list.extend(priors(problem, fit));
     let excluded = problem.rejected.iter().flatten().filter(|rejected| **rejected).count();
     if excluded > 0 {

@@ -12,7 +12,7 @@ use super::families::{FoldEquations, Scales, families};
 use super::numbers::{fit_with_numbers, intervals};
 use super::{Fit, further_steps, positions};
 use crate::heldout::{rms_by_unit_mm, rms_mm};
-use crate::noise::{self, Noise, NoiseSource, PureError, ShownNoise, outliers};
+use crate::noise::{self, Noise, NoiseSource, PureError, Repeatability, ShownNoise, outliers};
 use crate::numerics::solve::Svd;
 use crate::numerics::triangle::Triangle;
 use crate::plausibility;
@@ -176,7 +176,7 @@ fn settled(mut problem: Problem, floor: f64) -> Result<(Problem, Fit), Diagnosti
         let rejected = outliers::reject(&problem, &fit.residuals);
         let unchanged = rejected == problem.rejected;
         problem.rejected = rejected;
-        let noise = noise(&problem, &fit, floor);
+        let noise = noise(&problem, &mut fit, floor);
         if unchanged && is_settled(&noise, &problem.noise) {
             break;
         }
@@ -300,13 +300,16 @@ fn is_settled(noise: &Noise, before: &Noise) -> bool {
 /// The noise that the session states or the readings show. The autocorrelation is that of repeats along runs. If these
 /// contradict the stated standard deviation, they may hold an effect that acts in one run, which is no noise: what is stated
 /// then counts as white noise.
-fn noise(problem: &Problem, fit: &Fit, floor: f64) -> Noise {
+fn noise(problem: &Problem, fit: &mut Fit, floor: f64) -> Noise {
     let stated_mm = problem.session.stated_noise_mm();
+    let pure = PureError::of(&problem.tests, &fit.residuals, |test, row| !problem.rejected[test][row]);
+    let repeats = pure.repeatability();
+    fit.repeats = Some(repeats);
     let white = match stated_mm {
         Some(sigma_mm) => Noise::white(sigma_mm, NoiseSource::Stated),
-        None => estimated_noise(problem, fit, floor),
+        None => estimated_noise(problem, fit, repeats, floor),
     };
-    let Some((_, shown)) = noise::along_runs(problem, &fit.residuals) else { return white };
+    let Some((_, shown)) = noise::autocorrelated(problem, pure) else { return white };
     let sigma_mm = shown.process.sigma_mm;
     let is_rounding = sigma_mm < floor.max(MIN_NOISE_MM);
     if shown.process.coefficients.is_empty() || shown.is_as_stated != stated_mm.is_some() || is_rounding {
@@ -315,9 +318,9 @@ fn noise(problem: &Problem, fit: &Fit, floor: f64) -> Noise {
     Noise { sigma_mm, ar_coefficients: shown.process.coefficients, ar_sum_u: shown.sum_u, ..white }
 }
 
-fn estimated_noise(problem: &Problem, fit: &Fit, floor: f64) -> Noise {
+fn estimated_noise(problem: &Problem, fit: &Fit, repeats: Repeatability, floor: f64) -> Noise {
     let kept = |test: usize, row: usize| !problem.rejected[test][row];
-    if let Some(shown) = ShownNoise::of(&problem.tests, &fit.residuals, kept) {
+    if let Some(shown) = ShownNoise::beside(repeats, &problem.tests, kept) {
         return Noise::white(shown.sigma_mm.max(floor).max(MIN_NOISE_MM), shown.source);
     }
     let count = problem.scalars() as f64;

@@ -88,7 +88,7 @@ pub fn model(
         judged_by.unwrap_or(JudgedBy { readings: problem, heldout_mm: None });
     let (rms, held, of_angles) = rms_of_units(problem, judged, fit, heldout_mm);
     let in_3d = |rms: f64| problem.are_vectors().then(|| rms * 3.0_f64.sqrt() * 1e3);
-    let determined = Determined::of(problem, &fit.rank)?;
+    let determined = Determined::of(problem, fit)?;
     let mut parameters = parameters(problem, fit);
     determined.mark(problem, &mut parameters, goodness);
     Ok(ModelResult {

@@ -9,7 +9,7 @@
 
 use abbe_model::Diagnostic;
 
-use super::left_out::{LeftOutTests, left_out_tests};
+use super::left_out::{LeftOutTests, left_out_tests_of_fit};
 use super::{FoldKind, held_out, stated_rms_mm};
 use crate::fit::Fit;
 use crate::problem::Problem;
@@ -34,7 +34,7 @@ pub fn cross_validation(
         None => (kind == FoldKind::RandomPoses).then_some(deciding_mm),
     };
     let run = matches!(kind, FoldKind::Runs | FoldKind::RunGroups).then_some(deciding_mm);
-    let left_out = left_out_tests(problem, &fit.beta)?;
+    let left_out = left_out_tests_of_fit(problem, fit)?;
     let test = left_out.rms_mm(judged);
     let three = problem.are_vectors().then_some(3.0_f64.sqrt());
     let in_3d = |mm: Option<f64>| Some(in_um(mm?) * three?);

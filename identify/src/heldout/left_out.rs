@@ -22,8 +22,9 @@ use faer::linalg::solvers::Llt;
 use faer::prelude::Solve;
 use faer::{Mat, Side};
 
-use super::{predicted, stated_rms_mm};
+use super::{FoldKind, predicted, stated_rms_mm};
 use crate::error;
+use crate::fit::Fit;
 use crate::numerics::parallel;
 use crate::numerics::symmetric::Symmetric;
 use crate::numerics::triangle::Triangle;
@@ -73,13 +74,39 @@ impl LeftOutTests {
 /// # Errors
 /// If the model cannot be evaluated.
 pub fn left_out_tests(problem: &Problem, beta: &[f64]) -> Result<LeftOutTests, Diagnostic> {
+    left_out(problem, beta, None)
+}
+
+/// The same at the solution of a fit.
+pub(super) fn left_out_tests_of_fit(problem: &Problem, fit: &Fit) -> Result<LeftOutTests, Diagnostic> {
+    left_out(problem, &fit.beta, triangles_of_tests(problem, fit))
+}
+
+/// The triangular factors of the tests from those of the folds, if each fold is a part of a test and the factors take less to
+/// merge than the readings to linearise.
+fn triangles_of_tests(problem: &Problem, fit: &Fit) -> Option<Vec<Triangle>> {
+    let (folds, count) = (&problem.folds, fit.beta.len());
+    let are_parts = matches!(folds.kind, FoldKind::Runs | FoldKind::RunGroups | FoldKind::Blocks);
+    if !are_parts || problem.readings() < folds.count * count * count {
+        return None;
+    }
+    let of_test = |test: usize| {
+        let mut parts: Vec<usize> = folds.of_row[test].chunk_by(|a, b| a == b).map(|part| part[0]).collect();
+        parts.sort_unstable();
+        parts.dedup();
+        Triangle::new(count).merged(parts.into_iter().map(|part| &fit.triangles[part]))
+    };
+    Some(parallel::map(problem.models.len(), &of_test))
+}
+
+fn left_out(problem: &Problem, beta: &[f64], triangles: Option<Vec<Triangle>>) -> Result<LeftOutTests, Diagnostic> {
     let tests = problem.models.len();
     if tests < 2 {
         return Ok(LeftOutTests { residuals: vec![None; tests], not_left_out: Vec::new() });
     }
     let problem = problem.folded_by_test();
     let size = problem.parameters.sizes();
-    let triangles = problem.triangles(beta)?;
+    let triangles = triangles.map_or_else(|| problem.triangles(beta), Ok)?;
     let of_tests: Vec<Normal> = parallel::map(tests, &|test| Normal::of(&triangles[test], &size));
     let prior = Normal::of(&problem.prior_triangle(beta), &size);
     let whole = of_tests.iter().fold(prior.clone(), |sum, own| sum.plus(own, 1.0));
@@ -260,6 +287,26 @@ mod tests {
             start += part.nrows();
         }
         all
+    }
+
+    /// The factors of tests that follow from those of folds are those of their readings.
+    #[test]
+    fn folds_give_the_factors_of_tests() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let mut session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
+        // Few parameters, so that the readings take more to linearise than the factors to merge.
+        session.unknowns.truncate(2);
+        let (problem, fit) = prepare(&session, 1).unwrap();
+        let of_folds = triangles_of_tests(&problem, &fit).unwrap();
+        let of_tests = problem.folded_by_test().triangles(&fit.beta).unwrap();
+        for (found, wanted) in of_folds.iter().zip(&of_tests) {
+            let product = |triangle: &Triangle| triangle.rows().transpose() * triangle.rows();
+            let (found, wanted) = (product(found), product(wanted));
+            let size = |j: usize| wanted[(j, j)].sqrt();
+            for (i, j) in (0..wanted.nrows()).flat_map(|i| (0..wanted.ncols()).map(move |j| (i, j))) {
+                assert!((found[(i, j)] - wanted[(i, j)]).abs() <= 1e-8 * size(i) * size(j), "{i} {j}");
+            }
+        }
     }
 
     /// The residual of each left-out test equals that of two dense least-squares problems: the model from the rows of

@@ -50,11 +50,16 @@ pub struct Process {
 /// The pure error of readings along runs, and the autocorrelation that it shows. `None` for independent poses and without
 /// enough repeats. `residuals` are those of any model, mm, test by test.
 pub fn along_runs(problem: &Problem, residuals: &[Vec<f64>]) -> Option<(PureError, Autocorrelation)> {
+    let kept = |test: usize, row: usize| !problem.rejected[test][row];
+    autocorrelated(problem, PureError::of(&problem.tests, residuals, kept))
+}
+
+/// The same of the pure error of a problem.
+pub(crate) fn autocorrelated(problem: &Problem, pure: PureError) -> Option<(PureError, Autocorrelation)> {
     if problem.folds.kind.is_poses() {
         return None;
     }
-    let kept = |test: usize, row: usize| !problem.rejected[test][row];
-    let along = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
+    let along = pure.without_waves(&problem.tests, |test, row| !problem.rejected[test][row]);
     let shown = along.autocorrelation(problem.session.stated_noise_mm())?;
     Some((along.pure, shown))
 }

@@ -25,6 +25,7 @@ use abbe_model::unit::{Unit, reading};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub(crate) use autocorrelation::autocorrelated;
 pub(crate) use autocorrelation::enlargement_of_mean;
 pub use autocorrelation::{Autocorrelation, Process, along_runs};
 pub(crate) use stated::silent_channels;
@@ -33,6 +34,7 @@ use trends::Trends;
 pub use waves::AlongRuns;
 
 use crate::numerics::parallel;
+use crate::problem::Problem;
 
 /// The noise of one scalar reading.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -178,13 +180,37 @@ impl ShownNoise {
         residuals: &[Vec<f64>],
         kept: impl Fn(usize, usize) -> bool + Sync,
     ) -> Option<ShownNoise> {
-        let pure = PureError::of(tests, residuals, &kept);
-        if let Some(sigma_mm) = pure.sigma_mm() {
-            return Some(ShownNoise { sigma_mm, freedom: pure.freedom, source: NoiseSource::Repeats });
+        ShownNoise::beside(PureError::of(tests, residuals, &kept).repeatability(), tests, kept)
+    }
+
+    /// From known repeats; without enough of them, from several targets at each pose.
+    pub(crate) fn beside(
+        repeats: Repeatability,
+        tests: &[Test],
+        kept: impl Fn(usize, usize) -> bool + Sync,
+    ) -> Option<ShownNoise> {
+        if let Some(sigma_mm) = repeats.sigma_mm {
+            return Some(ShownNoise { sigma_mm, freedom: repeats.freedom, source: NoiseSource::Repeats });
         }
         let (sigma_mm, freedom) = flange::noise_of_targets(tests, kept)?;
         // Targets that keep their distances exactly were solved as one body: they show no noise.
         (sigma_mm > RIGID_MM).then_some(ShownNoise { sigma_mm, freedom, source: NoiseSource::Targets })
+    }
+}
+
+/// The noise that repeats show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Repeatability {
+    /// Standard deviation, mm, if there are at least ten degrees of freedom.
+    pub sigma_mm: Option<f64>,
+    /// Degrees of freedom.
+    pub freedom: usize,
+}
+
+impl Repeatability {
+    /// From the residuals of any model of a problem, mm, test by test.
+    pub(crate) fn of(problem: &Problem, residuals: &[Vec<f64>]) -> Repeatability {
+        PureError::of(&problem.tests, residuals, |test, row| !problem.rejected[test][row]).repeatability()
     }
 }
 
@@ -250,6 +276,11 @@ impl PureError {
     fn count(&mut self) {
         // The small term keeps rounding of a trace from costing a degree of freedom.
         self.freedom = (self.freedom_of_tests.iter().sum::<f64>() + 1e-6).floor() as usize;
+    }
+
+    /// Its standard deviation and degrees of freedom.
+    pub fn repeatability(&self) -> Repeatability {
+        Repeatability { sigma_mm: self.sigma_mm(), freedom: self.freedom }
     }
 
     /// The standard deviation, mm, if there are at least ten degrees of freedom.
@@ -319,9 +350,35 @@ fn deviations(
 /// Least share of the variance that the trends must leave.
 const MIN_VARIANCE_SHARE: f64 = 0.05;
 
-/// A position as an integer: positions agree to 0.1 µm or 10⁻⁴ rad.
-fn key(position: f64) -> i64 {
-    (position * 1e4).round() as i64
+/// Positions agree to 0.1 µm or 10⁻⁴ rad: positions per mm or rad.
+const POSITIONS: f64 = 1e4;
+/// Number of these positions on the way of a run from which its steps are no jitter of an axis at rest.
+const MIN_WAY: f64 = 100.0;
+
+/// The positions of an axis as integers.
+#[derive(Clone, Copy)]
+struct Grid {
+    origin: f64,
+    /// Positions per mm or rad.
+    density: f64,
+}
+
+impl Grid {
+    const COARSE: Grid = Grid { origin: 0.0, density: POSITIONS };
+
+    /// In runs of finer steps neighbouring readings would be repeats of each other, whose deviations from their mean are
+    /// correlated. There positions that differ by less than a step are one.
+    fn of(readings: &Readings, positions: &[f64]) -> Grid {
+        let runs = readings.runs().into_iter().filter(|run| run.len() > 1);
+        let ways = runs.map(|run| ((positions[run.end - 1] - positions[run.start]).abs(), (run.len() - 1) as f64));
+        let densities = ways.filter(|(way, _)| way * POSITIONS > MIN_WAY).map(|(way, count)| count / way);
+        let density = densities.fold(POSITIONS, f64::max);
+        if density > POSITIONS { Grid { origin: positions[0], density } } else { Grid::COARSE }
+    }
+
+    fn key(self, position: f64) -> i64 {
+        ((position - self.origin) * self.density).round() as i64
+    }
 }
 
 /// The position of a reading as integers that are equal for repeats: axis positions and directions of travel, without
@@ -335,25 +392,27 @@ impl RepeatKeys {
     /// Of readings that are compared within their test.
     fn of(readings: &Readings) -> RepeatKeys {
         // The comparison of the positions themselves spares most of the rounding.
+        let key = |position: f64| Grid::COARSE.key(position);
         let differs = |column: &&Vec<f64>| {
             column.iter().any(|position| *position != column[0] && key(*position) != key(column[0]))
         };
-        RepeatKeys::of_axes(readings, readings.positions.iter().filter(differs).collect())
+        let moving = readings.positions.iter().filter(differs).map(|column| (column, Grid::of(readings, column)));
+        RepeatKeys::of_axes(readings, moving.collect())
     }
 
     /// Of readings that are compared with those of other tests: axes that are equal in all rows of one test count too.
     fn between_tests(readings: &Readings) -> RepeatKeys {
-        RepeatKeys::of_axes(readings, readings.positions.iter().collect())
+        RepeatKeys::of_axes(readings, readings.positions.iter().map(|column| (column, Grid::COARSE)).collect())
     }
 
-    fn of_axes(readings: &Readings, moving: Vec<&Vec<f64>>) -> RepeatKeys {
+    fn of_axes(readings: &Readings, moving: Vec<(&Vec<f64>, Grid)>) -> RepeatKeys {
         let directions = if readings.run.is_empty() { Vec::new() } else { directions(readings) };
         let has_directions = directions.iter().any(|direction| *direction != directions[0]);
         let columns = moving.len() + usize::from(has_directions);
         let mut keys = vec![0; readings.rows() * columns];
-        for (number, positions) in moving.iter().enumerate() {
+        for (number, (positions, grid)) in moving.iter().enumerate() {
             let keys = keys.iter_mut().skip(number).step_by(columns);
-            keys.zip(*positions).for_each(|(to, position)| *to = key(*position));
+            keys.zip(*positions).for_each(|(to, position)| *to = grid.key(*position));
         }
         if has_directions {
             keys.iter_mut().skip(moving.len()).step_by(columns).zip(&directions).for_each(|(to, code)| *to = *code);

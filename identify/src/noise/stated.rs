@@ -1,6 +1,7 @@
 //! Comparison of the stated noise with the noise of repeats and of several targets.
 
-use super::{PureError, RIGID_MM, flange};
+use super::{RIGID_MM, Repeatability, flange};
+use crate::fit::Fit;
 use crate::numerics::tails::chi_square_tails;
 use crate::problem::Problem;
 
@@ -10,14 +11,13 @@ const DISAGREEMENT_RATIO: f64 = 2.0;
 const DISAGREEMENT_P: f64 = 0.001;
 
 /// A warning if repeated readings scatter by more than twice or less than half of the stated noise, significantly.
-/// `residuals` are those of any model, mm, test by test.
-pub fn stated_against_repeats(problem: &Problem, residuals: &[Vec<f64>]) -> Option<String> {
+pub fn stated_against_repeats(problem: &Problem, fit: &Fit) -> Option<String> {
     let stated_mm = problem.session.stated_noise_mm()?;
-    let pure = PureError::of(&problem.tests, residuals, |test, row| !problem.rejected[test][row]);
-    let sigma_mm = pure.sigma_mm()?;
+    let repeats = fit.repeats.unwrap_or_else(|| Repeatability::of(problem, &fit.residuals));
+    let sigma_mm = repeats.sigma_mm?;
     let resolution_mm = problem.session.resolution_noise_mm();
     let ratio = sigma_mm.max(resolution_mm) / stated_mm;
-    let freedom = pure.freedom as f64;
+    let freedom = repeats.freedom as f64;
     let [below, above] = chi_square_tails(freedom * ratio * ratio, freedom)?;
     let by_chance = below.min(above) > DISAGREEMENT_P / 2.0;
     let unit = problem.unit();
@@ -28,7 +28,7 @@ pub fn stated_against_repeats(problem: &Problem, residuals: &[Vec<f64>]) -> Opti
              the stated noise; correct `noise_{unit}`, or omit it",
             stated_mm * 1e3,
             unit.text(sigma_mm * 1e3, 3),
-            pure.freedom,
+            repeats.freedom,
         )
     })
 }

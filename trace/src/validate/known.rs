@@ -314,7 +314,7 @@ impl<'m> KnownErrors<'m> {
     /// If the model cannot be evaluated.
     pub fn set_up_estimates(&self, values: &[f64]) -> Result<Vec<Estimate>, Diagnostic> {
         let problem = self.problem(values);
-        let Minimum { beta, triangles, rank } = minimum(&problem, None)?;
+        let Minimum { beta, triangles, rank, .. } = minimum(&problem, None)?;
         let whole = problem.prior_triangle(&beta).merged(&triangles);
         let covariance = whole.covariance(&rank.identifiable_basis)?;
         let list = problem.parameters.list.iter().enumerate().filter(|(j, _)| rank.is_identifiable(*j));
