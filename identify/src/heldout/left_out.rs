@@ -294,8 +294,12 @@ mod tests {
     fn folds_give_the_factors_of_tests() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
         let mut session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
-        // Few parameters, so that the readings take more to linearise than the factors to merge.
-        session.unknowns.truncate(2);
+        // Each reading many times, so that the readings take more to linearise than the factors to merge.
+        for test in &mut session.tests {
+            let readings = test.readings.as_ref().unwrap();
+            let rows: Vec<usize> = (0..readings.rows()).flat_map(|row| [row; 30]).collect();
+            test.readings = Some(std::sync::Arc::new(readings.of_rows(&rows)));
+        }
         let (problem, fit) = prepare(&session, 1).unwrap();
         let of_folds = triangles_of_tests(&problem, &fit).unwrap();
         let of_tests = problem.folded_by_test().triangles(&fit.beta).unwrap();

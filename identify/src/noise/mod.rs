@@ -447,6 +447,7 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
 
+    use super::trends::TERMS;
     use super::*;
 
     /// With the impulse response ψ of `x_t = Σ a_k x_{t−k} + e_t`, the variance of x is that of e times `Σ ψ²`.
@@ -531,6 +532,18 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// Two runs in steps of 20 µrad: the neighbours of a reading are no repeats of it, so that each place has one degree of
+    /// freedom, less those of the trend.
+    #[test]
+    fn neighbours_in_fine_steps_are_no_repeats() {
+        const PLACES: usize = 5000;
+        let readings = repeated(PLACES, 2);
+        let fine = readings.positions[0].iter().map(|position| 2e-4 * position + 0.3).collect();
+        let readings = Readings { positions: vec![fine], ..readings };
+        let residuals = vec![(0..2 * PLACES).map(|row| (row as f64).sin()).collect::<Vec<f64>>()];
+        assert_eq!(PureError::of_readings(&[Some(&readings)], &residuals, |_, _| true).freedom, PLACES - TERMS);
     }
 
     /// The degrees of freedom against the trace of the explicit product of both projectors, in a case where they do not

@@ -126,3 +126,49 @@ fn merged<S: RowSum>(parts: &[S]) -> Option<S> {
     others.iter().for_each(|other| sum.merge(other));
     Some(sum)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+
+    use abbe_files::ReadOptions;
+
+    use super::*;
+    use crate::fit::prepare;
+
+    /// A run of autocorrelated noise that is longer than a piece, with outliers about the ends of the pieces: the products of
+    /// its factors are those of its rows whitened as a whole.
+    #[test]
+    fn pieces_of_a_run_are_whitened_as_the_whole_run() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let mut session = abbe_files::session(&file, &ReadOptions::default()).unwrap();
+        let test = session.tests.last_mut().unwrap();
+        let readings = test.readings.as_ref().unwrap();
+        let twice: Vec<usize> = (0..readings.rows()).chain(0..readings.rows()).collect();
+        let mut long = readings.of_rows(&twice);
+        long.run = vec![1; twice.len()];
+        assert!(twice.len() > BLOCK_ROWS + BLOCK_ROWS / 4);
+        test.readings = Some(Arc::new(long));
+        let (mut problem, fit) = prepare(&session, 1).unwrap();
+        problem.noise.ar_coefficients = vec![0.6, 0.25];
+        let number = problem.models.len() - 1;
+        [BLOCK_ROWS - 1, BLOCK_ROWS + 1].iter().for_each(|row| problem.rejected[number][*row] = true);
+        let problem = problem.folded_by_test();
+        let product = |rows: faer::MatRef<'_, f64>| rows.transpose() * rows;
+        let found = product(problem.triangles(&fit.beta).unwrap()[number].rows());
+        let values = problem.slot_values(&fit.beta);
+        let blocks = problem.blocks();
+        let of_test: Vec<&RowBlock> = blocks.iter().filter(|block| block.test == number).collect();
+        assert!(of_test.len() == 1 && problem.pieces(of_test[0]).count() == 2);
+        let (white, _) = problem.whiten(&problem.rows(&values, of_test[0]).unwrap(), of_test[0]);
+        let wanted = product(white.as_ref());
+        // Two outliers, and the readings after them within the order of the filter: all from one before the end of the piece.
+        assert_eq!(white.nrows(), twice.len() - 5);
+        let width = wanted.nrows();
+        for (i, j) in (0..width).flat_map(|i| (0..width).map(move |j| (i, j))) {
+            let size = (wanted[(i, i)] * wanted[(j, j)]).sqrt();
+            assert!((found[(i, j)] - wanted[(i, j)]).abs() <= 1e-10 * size, "{i} {j}");
+        }
+    }
+}
