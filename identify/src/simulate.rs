@@ -121,7 +121,7 @@ const SETUP_STREAM: u128 = 0;
 /// not finite.
 pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated, Diagnostic> {
     if session.instruments().iter().any(|kind| !kind.entry().has_readings) {
-        let found = "a socket session has no readings to draw";
+        let found = "a session of contacts has no readings to draw";
         return Err(error::not_applicable("simulation", found, "its poses are its data"));
     }
     let planned = planned::planned_session(session)?;

@@ -29,7 +29,7 @@ fn any_set_up(kind: InstrumentKind) -> Node {
 
 /// A set-up of an instrument, as a session states it.
 pub(super) fn station(kind: InstrumentKind, set_up: &Node, machine: &Machine) -> Option<Station<f64>> {
-    let read = kind.entry().set_up(set_up, &[], machine).ok()?;
+    let read = kind.set_up(set_up, &[], machine).ok()?;
     Some(read.station.map(|length| length.mm))
 }
 

@@ -34,8 +34,13 @@ pub(super) fn tests(
     found: &mut Found,
 ) -> Result<Vec<Test>, Fault> {
     let name = &document.name;
-    let kind = document.kind.unwrap_or(context.instrument);
-    let SetUp { station: written, priors, socket, bar_setup } = set_up(kind, &document.set_up, context)?;
+    // A test that names the session's instrument has its targets too.
+    let other = document.kind.filter(|kind| kind.word() != context.instrument.word());
+    let kind = other.unwrap_or(context.instrument);
+    let common = context.targets.entries().iter();
+    let common = common.filter(|entry| other.is_none() && document.set_up.get(&entry.key).is_none());
+    let keys = document.set_up.entries().iter().chain(common).map(|entry| (entry.key.clone(), entry.node.clone()));
+    let SetUp { station: written, priors, socket, bar_setup } = set_up(kind, &Node::table(keys), context)?;
     let (station, geometry) = (written.map(|length| length.mm), written.map(|length| length.length.clone()));
     let HeldPositions { mut at, written: at_written, listed } = at(context, &document.at).within("at")?;
     let format = document.format.as_ref().map(|format| layout::format(format).within("format")).transpose()?;
@@ -131,14 +136,14 @@ pub(super) fn tests(
 /// The instrument's keys of a test.
 fn set_up(kind: InstrumentKind, keys: &Node, context: &Context<'_>) -> Result<SetUp, Fault> {
     let own = kind.entry();
-    own.set_up(keys, context.constants, context.machine).map_err(|fault| {
+    kind.set_up(keys, context.constants, context.machine).map_err(|fault| {
         let Some(key) = fault.unknown().map(str::to_string) else { return fault };
         match kinds().iter().find(|kind| kind.entry().keys().contains_key(&key)) {
-            Some(kind) => {
-                let whose = if own.kind == context.instrument { "session" } else { "test" };
+            Some(other) => {
+                let whose = if kind == context.instrument { "session" } else { "test" };
                 let what = format!(
                     "belongs to {}; this {whose}'s instrument is {}",
-                    with_article(kind.word()),
+                    with_article(other.word()),
                     with_article(own.word)
                 );
                 Fault::of_key(what, None).on_key().at(&key)

@@ -16,10 +16,11 @@ use abbe_model::chain::Machine;
 use abbe_model::diagnostic::Location;
 use abbe_model::document::effect as effect_document;
 use abbe_model::document::fault::{Fault, Within};
+use abbe_model::document::node::Node;
 use abbe_model::document::session::{self as document, Parts};
 use abbe_model::driver::column;
 use abbe_model::effect::Effect;
-use abbe_model::instrument::{InstrumentKind, InstrumentParameter, kinds};
+use abbe_model::instrument::{InstrumentKind, InstrumentParameter, composed, kinds};
 use abbe_model::session::expression::Constant;
 use abbe_model::session::{self, Session, Test};
 use rayon::prelude::*;
@@ -61,6 +62,8 @@ struct Context<'a> {
     /// The instrument of tests that name no other.
     instrument: InstrumentKind,
     constants: &'a [Constant],
+    /// The targets of a composed measurement.
+    targets: &'a Node,
     format: Format,
     columns: Option<Vec<ColumnMapping>>,
 }
@@ -87,7 +90,7 @@ pub(crate) fn head(
     comment: &dyn Fn(&[&str]) -> Option<String>,
 ) -> Result<Session, Fault> {
     let constants = head::constants(&document.constants, |name| comment(&["constants", name])).within("constants")?;
-    let kind = document.instrument.kind;
+    let (kind, targets) = composed::composed(document.instrument.kind, &document.parts, &machine)?;
     let [noise_mm, noise_rad, resolution_mm, resolution_rad] =
         head::noise(&document.instrument).within("instrument")?;
     let about = head::about(&document.about).within("about")?;
@@ -100,6 +103,7 @@ pub(crate) fn head(
         resolution_rad,
         unknowns,
         about,
+        targets,
         ..Session::new(machine, kind)
     })
 }
@@ -116,6 +120,7 @@ pub(crate) fn add(session: &mut Session, parts: &Parts, surroundings: &Surroundi
         machine: &session.machine,
         instrument: session.instrument,
         constants: &session.constants,
+        targets: &session.targets,
         format: format.unwrap_or_default(),
         columns,
     };

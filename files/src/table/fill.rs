@@ -200,6 +200,8 @@ pub(super) struct Filled<'a> {
     channel: Vec<usize>,
     /// For each channel whether the values are less the nominal reading.
     from_nominal: Vec<bool>,
+    /// The channels of a row before it is read: a contact reads zero.
+    unread: [f64; MAX_CHANNELS],
     pub readings: Readings,
     /// The line or item of each row, from 1.
     pub line: Vec<usize>,
@@ -217,6 +219,9 @@ impl<'a> Filled<'a> {
     pub fn new(request: &'a Request<'a>, columns: Vec<Column>, rows: usize) -> Self {
         let station = columns::kept(&request.test.station, &columns::quantities(&columns));
         let channels = station.channels().len();
+        let mut unread = [f64::NAN; MAX_CHANNELS];
+        let contacts = unread.iter_mut().zip(station.channels()).filter(|(_, channel)| channel.is_contact);
+        contacts.for_each(|(value, _)| *value = 0.0);
         let mut readings = Readings {
             positions: vec![Vec::new(); request.machine.axes.len()],
             channels,
@@ -242,7 +247,7 @@ impl<'a> Filled<'a> {
         }
         let (line, socket, sockets, cells) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let polar = Vec::new();
-        Filled { request, columns, channel, from_nominal, readings, line, socket, sockets, polar, cells }
+        Filled { request, columns, channel, from_nominal, unread, readings, line, socket, sockets, polar, cells }
     }
 
     /// The number of traversals whose readings stand side by side; 0 if each row is a reading.
@@ -296,10 +301,7 @@ impl<'a> Filled<'a> {
     pub fn push(&mut self, row: &impl Cells) -> Result<(), Diagnostic> {
         let can_lack = self.can_lack();
         let readings = &mut self.readings;
-        let mut observed = [f64::NAN; MAX_CHANNELS];
-        if !self.request.instrument().entry().has_readings {
-            observed.fill(0.0);
-        }
+        let mut observed = self.unread;
         let mut quaternion = [f64::NAN; 4];
         let mut of_quaternion = None;
         for (column, channel) in self.columns.iter().zip(&self.channel) {

@@ -8,6 +8,7 @@
 
 #![allow(rustdoc::broken_intra_doc_links, reason = "the schema has the same texts, with `[machine]` for a table")]
 
+pub mod composed;
 mod de;
 pub mod edit;
 pub mod effect;

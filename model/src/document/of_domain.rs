@@ -87,7 +87,7 @@ pub fn test(test: &DomainTest, machine: &chain::Machine, instrument: InstrumentK
     let moved = test.motion.as_ref()?;
     let (sweep, path) = motion(moved, machine);
     let mut set_up = test.station.written(&test.priors)?;
-    test.station.frames().for_each(|(key, frame)| set_up.set(&key, frame.word(machine).as_str()));
+    test.station.frames().into_iter().for_each(|(key, frame)| set_up.set(&key, frame.word(machine).as_str()));
     let kind = test.station.kind();
     let stated = |set_up: &String, default: &str| (set_up != default).then(|| set_up.clone());
     if let Some(name) = stated(&test.bar_setup, &test.name).filter(|_| kind.shares(SharedBy::BarSetup)) {

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, Serializer};
 
+use super::composed::{Channel, Target};
 use super::effect::Effect;
 use super::layout::{Columns, Format};
 use super::machine::Machine;
@@ -60,6 +61,12 @@ pub struct Parts {
     /// The effects that the user declares.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub effect: Vec<Effect>,
+    /// The targets of a composed measurement.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub target: Vec<Target>,
+    /// The channels of a composed measurement.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub channel: Vec<Channel>,
     /// The tests.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(min = 1))]

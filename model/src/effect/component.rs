@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::chain::Machine;
 use crate::component::ErrorName;
-use crate::instrument::{InstrumentParameter, kinds};
+use crate::instrument::{InstrumentParameter, composed, kinds};
 use crate::session::readings::Readings;
 use crate::unit::InternalUnit;
 
@@ -39,7 +39,7 @@ impl Component {
             .iter()
             .flat_map(|kind| kind.unknowns())
             .any(|unknown| unknown.thing == thing && unknown.coordinate == coordinate);
-        if known {
+        if known || composed::is_parameter(thing, coordinate) {
             return Some(Component::Instrument { thing: thing.to_string(), coordinate: coordinate.to_string() });
         }
         ErrorName::parse(text).map(Component::Axis)

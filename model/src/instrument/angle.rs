@@ -13,7 +13,7 @@ use super::kind::Checked;
 use super::operation::direction_in_words;
 use super::set_up::{self, SetUp, Stated, Written};
 use super::{Aligned, Travel, 
-    Entry, Fault, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
+    Entry, Fault, Geometry, Handling, Instrument, InstrumentParameter, Reading, SharedBy, Station,
     point,
 };
 use crate::axis::AxisKind;
@@ -36,7 +36,7 @@ pub(super) const ENTRY: Entry = Entry {
     is_two_sided: true,
     rows_can_lack_channels: true,
     needs_every_axis: false,
-    ..Entry::new(InstrumentKind::Angle, ["angle", "a sensor of angles"], &PARAMETERS, schema::properties::<Keys>, &[], read)
+    ..Entry::new(["angle", "a sensor of angles"], &PARAMETERS, schema::properties::<Keys>, &[], read)
 };
 
 /// A direction is horizontal if its component along gravity is smaller.

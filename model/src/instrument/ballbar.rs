@@ -10,7 +10,7 @@ use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::check::{MAX_MM, doubt_on_scatter};
 use super::set_up::{self, SetUp, Stated};
-use super::{Contact, Checked, Entry, Fault, Following, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station, Target, default_errors};
+use super::{Contact, Checked, Entry, Fault, Following, Geometry, Handling, Instrument, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station, Target, default_errors};
 use crate::median::median;
 use crate::chain::{AxisPosition, Frame, Machine, MachineState};
 use crate::document::node::Node;
@@ -40,7 +40,7 @@ pub(super) const ENTRY: Entry = Entry {
     is_two_sided: true,
     needs_every_axis: false,
     default_errors: default_errors::positions_and_orientations,
-    ..Entry::new(InstrumentKind::BallBar, ["ballbar", "a double ball bar"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
+    ..Entry::new(["ballbar", "a double ball bar"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
 };
 
 /// The channels.

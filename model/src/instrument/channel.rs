@@ -14,15 +14,17 @@ pub struct Channel {
     pub unit: InternalUnit,
     /// Whether it is one of three coordinates of a vector.
     pub is_coordinate: bool,
+    /// Whether it reads zero without a column: a contact.
+    pub is_contact: bool,
 }
 
 impl Channel {
     pub(super) const fn length(name: &'static str) -> Channel {
-        Channel { name, unit: InternalUnit::Millimetre, is_coordinate: false }
+        Channel { name, unit: InternalUnit::Millimetre, is_coordinate: false, is_contact: false }
     }
 
     pub(super) const fn angle(name: &'static str) -> Channel {
-        Channel { name, unit: InternalUnit::Radian, is_coordinate: false }
+        Channel { name, unit: InternalUnit::Radian, is_coordinate: false, is_contact: false }
     }
 
     /// Three coordinates.
@@ -31,6 +33,11 @@ impl Channel {
             Channel { is_coordinate: true, ..Channel::length(name) }
         }
         [coordinate(x), coordinate(y), coordinate(z)]
+    }
+
+    /// The same, which reads zero without a column.
+    pub(super) const fn of_contact(self) -> Channel {
+        Channel { is_contact: true, ..self }
     }
 
     /// Whether it is an angle.

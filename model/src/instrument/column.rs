@@ -49,7 +49,7 @@ impl Quantity {
 }
 
 /// A column of readings.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Column {
     /// Its name without the unit.
     pub stem: &'static str,

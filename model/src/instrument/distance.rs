@@ -9,7 +9,7 @@ use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::set_up::{self, SetUp, Stated};
 use super::{Aligned, Travel, 
-    Checked, Entry, Fault, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station, Target,
+    Checked, Entry, Fault, Geometry, Handling, Instrument, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station, Target,
     default_errors,
 };
 use crate::chain::{Frame, MachineState};
@@ -38,7 +38,7 @@ pub(super) const ENTRY: Entry = Entry {
     default_errors: default_errors::all_locations,
     // The reflector stays mounted while the station moves.
     spindle_setup: Some("tool"),
-    ..Entry::new(InstrumentKind::Distance, ["distance", "distances from a station"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
+    ..Entry::new(["distance", "distances from a station"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
 };
 
 /// The channels.

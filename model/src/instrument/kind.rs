@@ -8,7 +8,7 @@ use super::default_errors;
 use super::operation::{Aligned, Contact, Following, Handling, Travel};
 use super::set_up::{self, SetUp, Stated};
 use super::target::Target;
-use super::{InstrumentKind, InstrumentParameter, Reading, SharedBy, Station};
+use super::{InstrumentParameter, Reading, SharedBy, Station};
 use crate::chain::{AxisPosition, Frame, Machine, MachineState};
 use crate::component::ErrorName;
 use crate::document::Fault as KeyFault;
@@ -23,8 +23,6 @@ use crate::words::number;
 
 /// An instrument in the registry: what is known of it without a set-up.
 pub struct Entry {
-    /// The kind.
-    pub kind: InstrumentKind,
     /// The word in files.
     pub word: &'static str,
     /// What it is in a sentence, with its article.
@@ -61,7 +59,6 @@ impl Entry {
     /// An instrument that is mounted for each test, has readings in every row, and reads one side of the machine. What
     /// differs is stated with `..Entry::new(…)`.
     pub(super) const fn new(
-        kind: InstrumentKind,
         [word, phrase]: [&'static str; 2],
         parameters: &'static [InstrumentParameter],
         keys: fn() -> serde_json::Map<String, serde_json::Value>,
@@ -69,7 +66,6 @@ impl Entry {
         read: fn(&Stated<'_>) -> Result<SetUp, KeyFault>,
     ) -> Entry {
         Entry {
-            kind,
             word,
             phrase,
             parameters,
@@ -93,11 +89,8 @@ impl Entry {
         (self.keys)().into_iter().chain(frames).collect()
     }
 
-    /// The set-up of a test, whose lengths may be expressions in the constants.
-    ///
-    /// # Errors
-    /// What is wrong with a key.
-    pub fn set_up(&self, keys: &Node, constants: &[Constant], machine: &Machine) -> Result<SetUp, KeyFault> {
+    /// See [`InstrumentKind::set_up`](super::InstrumentKind::set_up).
+    pub(super) fn set_up(&self, keys: &Node, constants: &[Constant], machine: &Machine) -> Result<SetUp, KeyFault> {
         (self.read)(&Stated::new(self.points, keys, constants, machine)?)
     }
 }

@@ -23,7 +23,7 @@ use super::kind::Checked;
 use super::operation::direction_in_words;
 use super::set_up::{self, SetUp, Stated, Written};
 use super::{Aligned, Travel, 
-    Entry, Fault, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station, Target,
+    Entry, Fault, Geometry, Handling, Instrument, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station, Target,
     point,
 };
 use crate::median::median;
@@ -65,7 +65,7 @@ pub(super) const ENTRY: Entry = Entry {
     is_two_sided: true,
     rows_can_lack_channels: true,
     needs_every_axis: false,
-    ..Entry::new(InstrumentKind::Laser, ["laser", "a laser interferometer"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
+    ..Entry::new(["laser", "a laser interferometer"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
 };
 
 /// The channels in the order of their zeros.

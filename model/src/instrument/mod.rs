@@ -7,6 +7,7 @@ mod check;
 pub mod column;
 mod default_errors;
 mod kind;
+pub mod measured;
 mod operation;
 mod parameter;
 pub mod set_up;
@@ -22,22 +23,26 @@ use std::ops::{Deref, DerefMut};
 use std::str::FromStr;
 
 use column::Quantity;
+use set_up::SetUp;
 
 use crate::Diagnostic;
 use crate::chain::{AxisPosition, BodyErrors, Frame, Machine, MachineState};
 use crate::component::ErrorName;
+use crate::document::Fault as KeyFault;
+use crate::document::node::Node;
 use crate::scalar::{Nominal, Scalar};
+use crate::session::expression::Constant;
 use crate::words::listed;
 
 /// Declares the modules, the enumerations and the list of all instruments.
 macro_rules! instruments {
-    ($($(#[$doc:meta])* $module:ident: $kind:ident,)+) => {
+    ($($(#[$doc:meta])* $module:ident: $kind:ident $(($of:ty = $none:expr))?,)+) => {
         $(pub mod $module;)+
 
         /// The kind of instrument of a session.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum InstrumentKind {
-            $($(#[$doc])* $kind,)+
+            $($(#[$doc])* $kind $(($of))?,)+
         }
 
         /// An instrument as set up for one test: its nominal geometry.
@@ -48,12 +53,15 @@ macro_rules! instruments {
 
         impl InstrumentKind {
             /// All kinds.
-            pub const ALL: &[InstrumentKind] = &[$(InstrumentKind::$kind,)+];
+            pub const ALL: &[InstrumentKind] = &[$(InstrumentKind::$kind $(($none))?,)+];
 
             /// Its entry in the registry.
             pub fn entry(self) -> &'static Entry {
+                if let InstrumentKind::Composed(composition) = self {
+                    return composition.entry();
+                }
                 match self {
-                    $(InstrumentKind::$kind => &$module::ENTRY,)+
+                    $(InstrumentKind::$kind { .. } => &$module::ENTRY,)+
                 }
             }
         }
@@ -61,8 +69,11 @@ macro_rules! instruments {
         impl<N> Station<N> {
             /// The kind of the instrument.
             pub fn kind(&self) -> InstrumentKind {
+                if let Station::Composed(own) = self {
+                    return InstrumentKind::Composed(own.composition);
+                }
                 match self {
-                    $(Station::$kind(_) => InstrumentKind::$kind,)+
+                    $(Station::$kind(_) => InstrumentKind::$kind $(($none))?,)+
                 }
             }
 
@@ -153,6 +164,8 @@ instruments! {
     distance: Distance,
     /// The pointing of a mount.
     pointing: Pointing,
+    /// Channels between targets that a session composes.
+    composed: Composed(composed::Composition = composed::NONE),
 }
 
 /// All kinds of instruments.
@@ -236,6 +249,17 @@ impl InstrumentKind {
         self.unknowns().iter().any(|parameter| parameter.shared_by == by)
     }
 
+    /// The set-up of a test, whose lengths may be expressions in the constants.
+    ///
+    /// # Errors
+    /// What is wrong with a key.
+    pub fn set_up(self, keys: &Node, constants: &[Constant], machine: &Machine) -> Result<SetUp, KeyFault> {
+        match self {
+            InstrumentKind::Composed(composition) => composition.set_up(keys, constants, machine),
+            _ => self.entry().set_up(keys, constants, machine),
+        }
+    }
+
     /// The errors to be estimated if a session states none.
     pub fn default_errors(self, machine: &Machine) -> Vec<ErrorName> {
         (self.entry().default_errors)(machine)
@@ -274,11 +298,14 @@ impl Station<f64> {
     }
 
     /// The points that are not fixed on their default bodies: the key of each, and its frame.
-    pub fn frames(&self) -> impl Iterator<Item = (String, Frame)> {
+    pub fn frames(&self) -> Vec<(String, Frame)> {
+        if let Station::Composed(own) = self {
+            return own.frames();
+        }
         let (defaults, mut own) = (self.kind().entry().points.iter(), self.clone());
         let frames: Vec<Frame> = own.points_mut().into_iter().flatten().map(|target| target.frame).collect();
         let others = defaults.zip(frames).filter(|((_, default), frame)| default != frame);
-        others.map(|((name, _), frame)| (format!("{name}{}", set_up::FRAME), frame))
+        others.map(|((name, _), frame)| (format!("{name}{}", set_up::FRAME), frame)).collect()
     }
 }
 

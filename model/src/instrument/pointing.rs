@@ -14,7 +14,7 @@ use super::column::{Column, Quantity};
 use super::kind::{Checked, Group};
 use super::set_up::{self, SetUp, Stated, Written};
 use super::{Aligned, Travel, 
-    Entry, Fault, Geometry, Instrument, InstrumentKind, InstrumentParameter, Reading, SharedBy, Station,
+    Entry, Fault, Geometry, Instrument, InstrumentParameter, Reading, SharedBy, Station,
     default_errors, point,
 };
 use crate::median::median;
@@ -39,7 +39,7 @@ pub(super) const ENTRY: Entry = Entry {
     default_errors: default_errors::orientations,
     // The line of sight stays from night to night.
     spindle_setup: Some("tool"),
-    ..Entry::new(InstrumentKind::Pointing, ["pointing", "observed directions"], &PARAMETERS, schema::properties::<Keys>, &[], read)
+    ..Entry::new(["pointing", "observed directions"], &PARAMETERS, schema::properties::<Keys>, &[], read)
 };
 
 /// The channels.
@@ -75,7 +75,7 @@ fn read(set_up: &Stated<'_>) -> Result<SetUp, KeyFault> {
 }
 
 /// A line of sight with across and up. Across is horizontal; of a vertical line of sight it is −Y, as of one to the north.
-fn about(sight: Point<f64>) -> [Point<f64>; 3] {
+pub(super) fn about(sight: Point<f64>) -> [Point<f64>; 3] {
     let horizontal = cross(sight.0, Point([0.0, 0.0, 1.0]));
     let length = horizontal.norm();
     let across = if length > 1e-6 { Point(horizontal.0.map(|x| x / length)) } else { Point([0.0, -1.0, 0.0]) };

@@ -21,7 +21,7 @@ use super::column::{Column, OF_ROTATION, Quantity};
 use super::set_up::{self, SetUp, Stated};
 use super::stand::{self, Stand, pose_error};
 use super::{
-    Aligned, Entry, Fault, Geometry, Group, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint,
+    Aligned, Entry, Fault, Geometry, Group, Handling, Instrument, InstrumentParameter, InstrumentPoint,
     Misreading, MisreadingKind, Reading, SharedBy, Station, Target, Travel, default_errors,
 };
 use crate::chain::{AxisPosition, BodyErrors, Frame, Machine, MachineState};
@@ -53,9 +53,7 @@ pub(super) const ENTRY: Entry = Entry {
     reads_poses: true,
     rows_can_lack_channels: true,
     default_errors: default_errors::all_locations,
-    ..Entry::new(
-        InstrumentKind::Pose,
-        ["pose", "poses of a body at the tool"],
+    ..Entry::new(["pose", "poses of a body at the tool"],
         &PARAMETERS,
         schema::properties::<Keys>,
         POINTS,

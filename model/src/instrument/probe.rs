@@ -21,7 +21,7 @@ use super::check::MAX_MM;
 use super::set_up::{self, SetUp, Stated, Written};
 use super::stand::pose_error;
 use super::{Contact, 
-    Checked, Entry, Fault, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station, Target,
+    Checked, Entry, Fault, Geometry, Handling, Instrument, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station, Target,
     default_errors, point,
 };
 use crate::chain::{AxisPosition, Frame, Machine, MachineState};
@@ -54,7 +54,7 @@ const POINTS: &[(&str, Frame)] = &[("artefact", Frame::Table), ("stylus", Frame:
 pub(super) const ENTRY: Entry = Entry {
     is_two_sided: true,
     default_errors: default_errors::positions_and_orientations,
-    ..Entry::new(InstrumentKind::Probe, ["probe", "a touch probe"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
+    ..Entry::new(["probe", "a touch probe"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
 };
 
 /// The channels.

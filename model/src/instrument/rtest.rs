@@ -22,7 +22,7 @@ use super::column::{Column, Quantity};
 use super::check::MAX_MM;
 use super::set_up::{self, SetUp, Stated, Written};
 use super::{Contact, 
-    Checked, Entry, Fault, Following, Geometry, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Misreading, Reading, SharedBy,
+    Checked, Entry, Fault, Following, Geometry, Handling, Instrument, InstrumentParameter, InstrumentPoint, Misreading, Reading, SharedBy,
     Station, Target, default_errors, point,
 };
 use crate::median::median;
@@ -54,7 +54,7 @@ const POINTS: &[(&str, Frame)] = &[("workpiece_ball", Frame::Table), ("spindle_b
 pub(super) const ENTRY: Entry = Entry {
     is_two_sided: true,
     default_errors: default_errors::positions_and_orientations,
-    ..Entry::new(InstrumentKind::RTest, ["r-test", "an R-test"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
+    ..Entry::new(["r-test", "an R-test"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
 };
 
 /// The channels.

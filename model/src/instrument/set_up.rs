@@ -153,10 +153,32 @@ impl<'a> Stated<'a> {
         from_node(&self.keys).map_err(explained)
     }
 
+    /// The value of a key, if it is stated.
+    pub(super) fn value<T: DeserializeOwned>(&self, key: &str) -> Result<Option<T>, Fault> {
+        self.keys.get(key).map(|node| from_node(node).within(key)).transpose()
+    }
+
+    /// Checks that no other key is stated.
+    pub(super) fn only(&self, known: Vec<String>) -> Result<(), Fault> {
+        match self.keys.entries().iter().find(|entry| !known.contains(&entry.key)) {
+            Some(other) => {
+                let frames = self.frames.iter().map(|(name, _)| format!("{name}{FRAME}"));
+                Err(Fault::unknown_key(&other.key, known.into_iter().chain(frames).collect()))
+            }
+            None => Ok(()),
+        }
+    }
+
     /// A length above zero.
     pub(super) fn positive(&self, key: &str, length: &document::Length) -> Result<Written, Fault> {
+        let written = self.length(key, length)?;
+        limits::positive(written.mm).within(key)?;
+        Ok(written)
+    }
+
+    /// A length of any sign.
+    pub(super) fn length(&self, key: &str, length: &document::Length) -> Result<Written, Fault> {
         let (length, mm) = length.evaluated(key, self.constants).within(key)?;
-        limits::positive(mm).within(key)?;
         Ok(Written { length, mm })
     }
 
@@ -170,9 +192,14 @@ impl<'a> Stated<'a> {
         Ok(coordinates)
     }
 
+    /// The frame of a point or a direction.
+    pub(super) fn frame(&self, name: &str) -> Frame {
+        self.frames.iter().find(|(known, _)| *known == name).map_or(Frame::Bed, |(_, frame)| *frame)
+    }
+
     /// A point of the instrument, the origin of its frame where none is stated.
     pub(super) fn point<'p>(&self, name: &str, mm: impl Into<Option<&'p Point>>) -> Result<Target<Written>, Fault> {
-        let frame = self.frames.iter().find(|(known, _)| *known == name).map_or(Frame::Bed, |(_, frame)| *frame);
+        let frame = self.frame(name);
         let mm = match mm.into() {
             Some(mm) => self.coordinates(&format!("{name}_mm"), mm)?,
             None => [const { Written::number(0.0) }; 3],

@@ -10,7 +10,7 @@ use super::channel::Channel;
 use super::column::{Column, Quantity};
 use super::set_up::{self, SetUp, Stated, Written};
 use super::{Contact, 
-    Entry, Fault, Geometry, Group, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station, Target,
+    Entry, Fault, Geometry, Group, Handling, Instrument, InstrumentParameter, InstrumentPoint, Reading, SharedBy, Station, Target,
     default_errors, point,
 };
 use crate::chain::{Frame, MachineState};
@@ -36,11 +36,14 @@ pub(super) const ENTRY: Entry = Entry {
     default_errors: default_errors::all_locations,
     // The ball at a robot's flange stays mounted from socket to socket.
     spindle_setup: Some("tool"),
-    ..Entry::new(InstrumentKind::Socket, ["socket", "a ball in fixed sockets"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
+    ..Entry::new(["socket", "a ball in fixed sockets"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
 };
 
 /// The channels.
-const CHANNELS: [Channel; 3] = Channel::vector(["x", "y", "z"]);
+const CHANNELS: [Channel; 3] = {
+    let [x, y, z] = Channel::vector(["x", "y", "z"]);
+    [x.of_contact(), y.of_contact(), z.of_contact()]
+};
 
 /// The column of a socket: a pose consists of axis positions only.
 const COLUMNS: [Column; 1] = [Column::new("socket", Unit::One, Quantity::Socket)];

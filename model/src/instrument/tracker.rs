@@ -19,7 +19,7 @@ use super::column::{Column, Quantity};
 use super::set_up::{self, SetUp, Stated, Written};
 use super::stand::{Stand, pose_error};
 use super::{Aligned, Travel, 
-    Checked, Entry, Fault, Geometry, Group, Handling, Instrument, InstrumentKind, InstrumentParameter, InstrumentPoint, Reading, SharedBy,
+    Checked, Entry, Fault, Geometry, Group, Handling, Instrument, InstrumentParameter, InstrumentPoint, Reading, SharedBy,
     Station, Target, default_errors,
 };
 use crate::chain::{AxisPosition, Frame, Machine, MachineState};
@@ -47,7 +47,7 @@ pub(super) const ENTRY: Entry = Entry {
     free: Some("tracker"),
     reads_poses: true,
     default_errors: default_errors::all_locations,
-    ..Entry::new(InstrumentKind::Tracker, ["tracker", "a laser tracker"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
+    ..Entry::new(["tracker", "a laser tracker"], &PARAMETERS, schema::properties::<Keys>, POINTS, read)
 };
 
 /// The channels of coordinates.

@@ -19,6 +19,7 @@ use std::sync::Arc;
 use crate::body::ClearanceSizes;
 use crate::chain::Machine;
 use crate::component::ErrorName;
+use crate::document::node::Node;
 use crate::driver::Reference;
 use crate::effect::Effect;
 use crate::instrument::{Entry, InstrumentKind, InstrumentParameter, SharedBy, Station};
@@ -67,6 +68,8 @@ pub struct Session {
     /// Notes of `[about]` on the measurement, by name in the order of the file: `serial_number`, `operator`, `date`,
     /// `comment` and others. No calculation uses them; reports and results repeat them.
     pub about: Vec<(String, String)>,
+    /// The targets of a composed measurement: keys of the set-up of every test that does not state them.
+    pub targets: Node,
 }
 
 impl Session {
@@ -89,6 +92,7 @@ impl Session {
             clearance: None,
             warnings: Vec::new(),
             about: Vec::new(),
+            targets: Node::default(),
         }
     }
 
