@@ -5,17 +5,22 @@ use abbe_codegen::print::{LANGUAGES, Layout, Style};
 use abbe_codegen::program::Input;
 use abbe_codegen::{Equation, Options, Order, Source, Subject, Variable, check};
 use abbe_model::axis::AxisKind;
-use abbe_model::chain::{AxisPosition, Machine};
+use abbe_model::chain::{AxisPosition, Frame, Machine};
 use abbe_model::component::ErrorName;
+use abbe_model::document::composed as document;
+use abbe_model::document::session::Parts;
+use abbe_model::document::value::{Direction, Length, Three, Uncertainty};
 use abbe_model::instrument::angle::Angle;
 use abbe_model::instrument::column::Quantity;
+use abbe_model::instrument::composed::{Composed, Composition, composed};
 use abbe_model::instrument::distance::Distance;
 use abbe_model::instrument::laser::Laser;
+use abbe_model::instrument::measured::Place;
 use abbe_model::instrument::pointing::Pointing;
 use abbe_model::instrument::pose::Pose;
 use abbe_model::instrument::stand::Stand;
 use abbe_model::instrument::tracker::Tracker;
-use abbe_model::instrument::{Geometry, Station, Target};
+use abbe_model::instrument::{Geometry, InstrumentKind, Station, Target};
 use abbe_model::rotation_error::Body;
 use abbe_model::scalar::Nominal;
 use num_dual::Dual64;
@@ -34,9 +39,50 @@ pub enum Any {
     Pointing,
     Polar,
     Pose,
+    Composed,
 }
 
-const ALL: [Any; 6] = [Any::Laser, Any::Angle, Any::Distance, Any::Pointing, Any::Polar, Any::Pose];
+const ALL: [Any; 7] = [Any::Laser, Any::Angle, Any::Distance, Any::Pointing, Any::Polar, Any::Pose, Any::Composed];
+
+/// A stylus that touches a sphere, and its height above the centre along a direction of the tool.
+fn composition() -> Composition {
+    let texts = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let at = Some(Three([0.0; 3].map(Length::Number)));
+    let target = |name: &str, frame: &str| document::Target {
+        name: name.into(),
+        frame: Some(frame.into()),
+        ..document::Target::default()
+    };
+    let parts = Parts {
+        target: vec![
+            document::Target { point_mm: at.clone(), ..target("stylus", "tool") },
+            document::Target { point_mm: at, ..target("sphere", "table") },
+            document::Target { direction: Some(Direction([0.0, 0.0, 1.0])), ..target("normal", "tool") },
+            document::Target { length_mm: Some(Length::Number(15.5)), ..target("R", "table") },
+        ],
+        channel: vec![
+            document::Channel {
+                name: "contact".into(),
+                distance: Some(texts(&["stylus", "sphere"])),
+                less: texts(&["R"]),
+                reading: Some(0.0),
+                ..document::Channel::default()
+            },
+            document::Channel {
+                name: "height".into(),
+                along: Some(texts(&["stylus", "sphere", "normal"])),
+                column: Some("height_um".into()),
+                zero_u_um: Some(Uncertainty::unknown()),
+                ..document::Channel::default()
+            },
+        ],
+        ..Parts::default()
+    };
+    let machine = Machine::from_code("w C b X Z t").expect("a code");
+    let composed = composed("composed".parse().expect("a kind"), &parts, &machine).expect("a composition");
+    let (InstrumentKind::Composed(composition), _) = composed else { panic!("{composed:?}") };
+    composition
+}
 
 impl Source for Any {
     fn subject<N: Nominal>(&self, length: &impl Fn(&str) -> N) -> Subject<N> {
@@ -62,6 +108,16 @@ impl Source for Any {
             Any::Pointing => Pointing { directions, is_free: true }.into(),
             Any::Polar => Tracker { target: tool, stand: stand(), is_polar: true }.into(),
             Any::Pose => Pose { target: tool, stand: stand(), turn: None }.into(),
+            Any::Composed => {
+                let places = vec![
+                    Place::Point(tool),
+                    Place::Point(table),
+                    Place::Direction(Frame::Tool, directions),
+                    Place::Number(length("R")),
+                    Place::Number(N::constant(0.0)),
+                ];
+                Composed { composition: composition(), places }.into()
+            }
         })
     }
 }

@@ -147,3 +147,62 @@ at = { y_mm = 0, z_mm = 50, a_deg = 0 }
         &["session.toml:14", "`programmed_feed_mm_min` of a ball that lies on its axis of rotation", "feed_deg_min"],
     );
 }
+
+#[test]
+fn composed_measurements_that_do_not_fit_together() {
+    const COMPOSED: &str = r#"[[target]]
+name = "stylus"
+frame = "tool"
+point_mm = [0, 0, 0]
+
+[[target]]
+name = "sphere"
+frame = "table"
+point_mm = [0, 20, 0]
+
+[[target]]
+name = "R"
+length_mm = 15.5
+
+[[channel]]
+name = "contact"
+distance = ["stylus", "sphere"]
+less = ["R"]
+reading = 0
+
+[[test]]
+name = "1a"
+data = "C100.csv"
+at = { x_mm = 0, y_mm = 35.5, z_mm = 0, a_deg = 0 }
+"#;
+    const CONTACTS: &str = "c_deg\n0\n90\n";
+    let composed = without_tests().replace("ballbar", "composed") + COMPOSED;
+    let read = |from: &str, to: &str| {
+        assert!(composed.contains(from), "{from}");
+        session(MACHINE, &composed.replacen(from, to, 1), Some(CONTACTS))
+    };
+    let whole = read("R", "R").unwrap();
+    assert_eq!(whole.tests[0].readings.as_ref().unwrap().observed, [0.0, 0.0]);
+    assert_eq!(whole.tests[0].station.channels().len(), 1);
+    for (from, to, expected) in [
+        ("\"stylus\", \"sphere\"]", "\"stylus\", \"ball\"]", "\"ball\" is no target that is a point"),
+        ("less = [\"R\"]", "less = [\"sphere\"]", "\"sphere\" is no target that is a length"),
+        ("reading = 0", "reading = 15.5", "is another constant than 0"),
+        ("reading = 0", "", "has no reading, or two"),
+        ("reading = 0", "column = \"length_arcsec\"", "has no unit of the channel"),
+        ("reading = 0", "column = \"c_mm\"", "is the column of something else"),
+        ("reading = 0", "column = \"length_mm\"", "no column `length_mm`"),
+        ("distance = [", "along = [", "needs 3 targets"),
+        ("frame = \"table\"", "frame = \"axis B\"", "no body of the machine"),
+        ("frame = \"table\"\n", "", "[[target]] has no `frame`"),
+        ("name = \"sphere\"", "name = \"stylus\"", "stands twice"),
+        ("name = \"R\"", "name = \"R 1\"", "a name has at most 40 letters"),
+        ("length_mm = 15.5", "length_mm = 15.5\npoint_mm = [0, 0, 0]", "or several of them"),
+        ("length_mm = 15.5", "length_mm = 15.5\npoint_u_um = 1", "is of another target"),
+        ("point_mm = [0, 20, 0]", "point_mm = [0, 35.5, 0]", "nominally coincide"),
+        ("at = {", "R_m = 3\nat = {", "R_m"),
+        ("kind = \"composed\"", "kind = \"probe\"", "[[target]] in a session of a touch probe"),
+    ] {
+        assert_contains(&error_text(read(from, to)), &[expected]);
+    }
+}

@@ -6,10 +6,14 @@ mod topologies;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{ERRORS_PER_AXIS, Frame, Machine};
 use abbe_model::component::ErrorName;
+use abbe_model::document::composed as document;
+use abbe_model::document::session::Parts;
+use abbe_model::document::value::{Direction, Length, Three, Uncertainty};
 use abbe_model::frames::Rotation;
 use abbe_model::instrument::angle::Angle;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::column::Quantity;
+use abbe_model::instrument::composed;
 use abbe_model::instrument::distance::Distance;
 use abbe_model::instrument::laser::Laser;
 use abbe_model::instrument::pointing::Pointing;
@@ -230,6 +234,63 @@ fn the_recorded_chain_is_the_chain_over_dual_numbers_at_large_errors() {
                 let most = if kind == InstrumentKind::Probe { 1e-9 } else { 1e-11 };
                 assert!(worst < most, "{} with a {}: {worst:e}", machine.name, kind.word());
             }
+        }
+    }
+}
+
+/// Every channel of a composed measurement, between any bodies.
+fn composed_station(machine: &Machine, points: [[f64; 3]; 2]) -> Station<f64> {
+    let mm = |[x, y, z]: [f64; 3]| Some(Three([x, y, z].map(Length::Number)));
+    let target = |name: &str, frame: Frame| document::Target {
+        name: name.into(),
+        frame: Some(frame.word(machine)),
+        ..document::Target::default()
+    };
+    let texts = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let channel = |name: &str| document::Channel { name: name.into(), ..document::Channel::default() };
+    let parts = Parts {
+        target: vec![
+            document::Target { point_mm: mm(points[0]), ..target("stylus", Frame::Tool) },
+            document::Target { point_mm: mm(points[1]), ..target("sphere", Frame::Axis(0)) },
+            document::Target { direction: Some(Direction([0.6, 0.0, 0.8])), ..target("normal", Frame::Table) },
+            document::Target { length_mm: Some(Length::Number(15.5)), frame: None, ..target("R", Frame::Bed) },
+        ],
+        channel: vec![
+            document::Channel {
+                distance: Some(texts(&["stylus", "sphere"])),
+                less: texts(&["R"]),
+                reading: Some(0.0),
+                ..channel("contact")
+            },
+            document::Channel {
+                along: Some(texts(&["stylus", "sphere", "normal"])),
+                column: Some("height_um".into()),
+                zero_u_um: Some(Uncertainty::unknown()),
+                ..channel("height")
+            },
+            document::Channel {
+                rotation: Some(texts(&["tool", "table", "normal"])),
+                column: Some("turn_arcsec".into()),
+                zero_u_arcsec: Some(Uncertainty(1.0)),
+                ..channel("turn")
+            },
+        ],
+        ..Parts::default()
+    };
+    let (kind, keys) = composed::composed("composed".parse().unwrap(), &parts, machine).unwrap();
+    assert_eq!(kind.unknowns().len(), 3 + 3 + 2 + 1 + 1 + 1);
+    kind.set_up(&keys, &[], machine).unwrap().station.map(|length| length.mm)
+}
+
+#[test]
+fn composed_measurements_are_the_chain_over_dual_numbers() {
+    let mut random = Pcg64::seed_from_u64(4);
+    for mut machine in topologies::all(&mut random) {
+        for rotation in [Rotation::Exact, Rotation::SmallAngle] {
+            machine.rotation = rotation;
+            let points = [(); 2].map(|()| [(); 3].map(|()| uniform(&mut random, 300.0)));
+            let worst = worst_against_duals(&machine, composed_station(&machine, points), &mut random);
+            assert!(worst < 1e-11, "{}: {worst:e}", machine.name);
         }
     }
 }

@@ -4,6 +4,7 @@
 mod bodies;
 mod bundled;
 mod columns;
+mod contacts;
 mod diagonals;
 mod layouts;
 mod linear_axis;
