@@ -117,18 +117,20 @@ impl Composition {
             let [value, u] = keys_of(object);
             match object.form {
                 Form::Point => {
-                    let mm: Point = stated.value(&value)?.ok_or_else(|| missing(&value, "the point"))?;
+                    let mm: Point = stated.value(&value)?.ok_or_else(|| KeyFault::missing(&value, "the point"))?;
                     places.push(Place::Point(stated.point(object.name, &mm)?));
                     priors.extend(set_up::lengths(&stated.value::<Uncertainties>(&u)?.unwrap_or_default()));
                 }
                 Form::Direction => {
-                    let direction: Direction = stated.value(&value)?.ok_or_else(|| missing(&value, "the direction"))?;
+                    let direction: Direction =
+                        stated.value(&value)?.ok_or_else(|| KeyFault::missing(&value, "the direction"))?;
                     let axes = axes(direction.0).map(|axis| axis.map(set_up::Written::number));
                     places.push(Place::Direction(stated.frame(object.name), axes));
                     priors.extend([set_up::angle(stated.value(&u)?.unwrap_or_default()); 2]);
                 }
                 Form::Number(LENGTH, _) => {
-                    let length: Length = stated.value(&value)?.ok_or_else(|| missing(&value, "the length"))?;
+                    let length: Length =
+                        stated.value(&value)?.ok_or_else(|| KeyFault::missing(&value, "the length"))?;
                     places.push(Place::Number(stated.length(&value, &length)?));
                     priors.push(set_up::length(stated.value(&u)?.unwrap_or_default()));
                 }
@@ -143,10 +145,6 @@ impl Composition {
         stated.only(known)?;
         Ok(SetUp::new(Station::Composed(Composed { composition: self, places }), priors))
     }
-}
-
-fn missing(key: &str, what: &str) -> KeyFault {
-    KeyFault::missing(key, what)
 }
 
 /// The keys of a target in a test: its value, and its uncertainty.
@@ -192,12 +190,11 @@ fn is_name(text: &str) -> bool {
         && text.len() <= MAX_NAME
 }
 
-/// Longest name of a target.
+/// Longest name of a target, and the largest number of targets.
 const MAX_NAME: usize = 40;
-/// Largest number of targets.
 const MAX_TARGETS: usize = 20;
 
-/// A text that is kept for the process, once.
+/// A text, kept once for the process.
 fn kept(text: &str) -> &'static str {
     static KNOWN: Mutex<Vec<&'static str>> = Mutex::new(Vec::new());
     let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -220,13 +217,12 @@ pub fn composed(
 ) -> Result<(InstrumentKind, Node), KeyFault> {
     let (targets, channels) = (&parts.target, &parts.channel);
     if !matches!(kind, InstrumentKind::Composed(_)) {
-        let key =
-            [("target", targets.is_empty()), ("channel", channels.is_empty())].into_iter().find(|(_, none)| !none);
-        let help = "targets and channels are those of `kind = \"composed\"`";
-        let fault = |(key, _)| {
-            KeyFault::new(format!("[[{key}]] in a session of {}", kind.entry().phrase), help).on_key().at(key)
+        let Some((key, _)) = [("target", targets.len()), ("channel", channels.len())].into_iter().find(|of| of.1 > 0)
+        else {
+            return Ok((kind, Node::default()));
         };
-        return key.map_or(Ok((kind, Node::default())), |key| Err(fault(key)));
+        let message = format!("[[{key}]] in a session of {}", kind.entry().phrase);
+        return Err(KeyFault::new(message, "they are those of `kind = \"composed\"`").on_key().at(key));
     }
     for (key, count, most) in [("target", targets.len(), MAX_TARGETS), ("channel", channels.len(), MAX_CHANNELS)] {
         if count > most {
@@ -319,10 +315,8 @@ fn name(name: &str, others: &[Object]) -> Result<(), KeyFault> {
     if !is_name(name) {
         return Err(KeyFault::is(format!("\"{name}\"; a name has at most {MAX_NAME} letters, digits and `_`")));
     }
-    match others.iter().any(|other| other.name == name) {
-        true => Err(KeyFault::of_key(format!("= \"{name}\" stands twice"), "name targets and channels differently")),
-        false => Ok(()),
-    }
+    let is_known = others.iter().any(|other| other.name == name);
+    if is_known { Err(KeyFault::of_key(format!("= \"{name}\" stands twice"), None)) } else { Ok(()) }
 }
 
 /// The channels of a session while they are read.
