@@ -186,6 +186,7 @@ at = { x_mm = 0, y_mm = 35.5, z_mm = 0, a_deg = 0 }
     assert_eq!(whole.tests[0].station.channels().len(), 1);
     for (from, to, expected) in [
         ("\"stylus\", \"sphere\"]", "\"stylus\", \"ball\"]", "\"ball\" is no target that is a point"),
+        ("\"stylus\", \"sphere\"]", "\"stylus\", \"stylus\"]", "needs two different points"),
         ("less = [\"R\"]", "less = [\"sphere\"]", "\"sphere\" is no target that is a length"),
         ("reading = 0", "reading = 15.5", "is another constant than 0"),
         ("reading = 0", "", "has no reading, or two"),

@@ -233,12 +233,9 @@ pub fn composed(
     for (item, target) in targets.iter().enumerate() {
         let object = object(target, &objects, machine).within_item(item).within("target")?;
         let keys = node_of(target).unwrap_or_default();
-        let [value, u] = keys_of(&object);
-        for key in ["point_mm", "direction", "length_mm"] {
-            keys.get(key).into_iter().for_each(|node| common.set(&value, node.clone()));
-        }
-        for key in ["point_u_um", "direction_u_arcsec", "length_u_um"] {
-            keys.get(key).into_iter().for_each(|node| common.set(&u, node.clone()));
+        let own = [["point_mm", "direction", "length_mm"], ["point_u_um", "direction_u_arcsec", "length_u_um"]];
+        for (name, key) in keys_of(&object).iter().zip(own).flat_map(|(name, own)| own.map(|key| (name, key))) {
+            keys.get(key).into_iter().for_each(|node| common.set(name, node.clone()));
         }
         objects.push(object);
     }
@@ -418,6 +415,9 @@ impl Channels<'_> {
         let mut places = [0; COUNT];
         for (item, ((name, form), place)) in names.iter().zip(forms).zip(&mut places).enumerate() {
             *place = self.target(name, form).within_item(item)?;
+        }
+        if places[0] == places[1] {
+            return Err(KeyFault::of_key("needs two different points", None));
         }
         Ok(places)
     }
