@@ -184,6 +184,10 @@ at = { x_mm = 0, y_mm = 35.5, z_mm = 0, a_deg = 0 }
     let whole = read("R", "R").unwrap();
     assert_eq!(whole.tests[0].readings.as_ref().unwrap().observed, [0.0, 0.0]);
     assert_eq!(whole.tests[0].station.channels().len(), 1);
+    let alone = without_tests().replace("ballbar", "composed") + "[[test]]\nname = \"1a\"\ndata = \"C100.csv\"\n";
+    let read_alone = |key: &str| error_text(session(MACHINE, &(alone.clone() + key), Some(CONTACTS)));
+    assert_contains(&read_alone(""), &["is composed, but the session has no channel"]);
+    assert_contains(&read_alone("zz = 1\n"), &["has the unknown key `zz`"]);
     for (from, to, expected) in [
         ("\"stylus\", \"sphere\"]", "\"stylus\", \"ball\"]", "\"ball\" is no target that is a point"),
         ("\"stylus\", \"sphere\"]", "\"stylus\", \"stylus\"]", "needs two different points"),

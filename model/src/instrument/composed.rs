@@ -105,9 +105,6 @@ impl Composition {
 
     /// The set-up of a test.
     pub(super) fn set_up(self, keys: &Node, constants: &[Constant], machine: &Machine) -> Result<SetUp, KeyFault> {
-        if self.0.sums.is_empty() {
-            return Err(no_channel());
-        }
         let is_placed = |object: &&Object| !matches!(object.form, Form::Number(..));
         let placed: Vec<_> =
             self.0.objects.iter().filter(is_placed).map(|object| (object.name, object.frame)).collect();
@@ -143,6 +140,9 @@ impl Composition {
             known.extend([value, u]);
         }
         stated.only(known)?;
+        if self.0.sums.is_empty() {
+            return Err(no_channel());
+        }
         Ok(SetUp::new(Station::Composed(Composed { composition: self, places }), priors))
     }
 }
