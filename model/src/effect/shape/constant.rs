@@ -2,7 +2,7 @@
 
 use super::kind::{Basis, Entry, Follows, ShapeKind};
 use super::words::EffectWords;
-use super::{DriverSample, KeyWriter, Shape};
+use super::{DriverSample, Shape};
 use crate::scalar::Nominal;
 
 /// Constant: a PIGE.
@@ -18,13 +18,6 @@ pub(super) const ENTRY: Entry = Entry {
 };
 
 impl ShapeKind for Constant {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
-    fn write(&self, _: &mut KeyWriter) {}
-    fn check(&self) -> Result<(), String> {
-        Ok(())
-    }
     fn describe(&self, words: &EffectWords) -> String {
         format!("{}, constant", words.motion)
     }

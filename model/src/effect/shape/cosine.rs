@@ -28,9 +28,6 @@ pub(super) const ENTRY: Entry = Entry {
 };
 
 impl ShapeKind for Cosine {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn write(&self, keys: &mut KeyWriter) {
         keys.set("order", self.order);
     }

@@ -5,7 +5,7 @@
 
 use super::kind::{Basis, Entry, Follows, ShapeKind};
 use super::words::EffectWords;
-use super::{DriverSample, KeyWriter, Shape};
+use super::{DriverSample, Shape};
 use crate::effect::sampled::Sampled;
 use crate::scalar::Nominal;
 
@@ -34,13 +34,6 @@ fn is_finite(sampled: &Sampled) -> bool {
 pub struct Cotangent;
 
 impl ShapeKind for Cotangent {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
-    fn write(&self, _: &mut KeyWriter) {}
-    fn check(&self) -> Result<(), String> {
-        Ok(())
-    }
     fn describe(&self, words: &EffectWords) -> String {
         format!("{} with the cotangent of {}", words.motion, words.driver)
     }

@@ -74,9 +74,6 @@ fn members(sampled: &Sampled) -> Vec<(Shape, f64)> {
 }
 
 impl ShapeKind for Curve {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn write(&self, keys: &mut KeyWriter) {
         keys.quantity(&FROM, self.from);
         keys.quantity(&TO, self.to);

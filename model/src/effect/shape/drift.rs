@@ -2,7 +2,7 @@
 
 use super::kind::{Basis, Entry, Follows, Per, ShapeKind};
 use super::words::EffectWords;
-use super::{DriverSample, KeyWriter, Shape};
+use super::{DriverSample, Shape};
 use crate::driver::SECONDS_PER_HOUR;
 use crate::scalar::Nominal;
 
@@ -19,13 +19,6 @@ pub(super) const ENTRY: Entry = Entry {
 };
 
 impl ShapeKind for Drift {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
-    fn write(&self, _: &mut KeyWriter) {}
-    fn check(&self) -> Result<(), String> {
-        Ok(())
-    }
     fn describe(&self, words: &EffectWords) -> String {
         format!("{}, drifting with {}", words.motion, words.driver)
     }

@@ -35,9 +35,6 @@ pub(super) const ENTRY: Entry = Entry {
 };
 
 impl ShapeKind for FirstOrderLag {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn write(&self, keys: &mut KeyWriter) {
         keys.set("tau_s", self.tau_s);
         keys.quantity(&polynomial::SCALE, self.scale);
@@ -61,9 +58,6 @@ impl ShapeKind for FirstOrderLag {
     }
     fn reported(&self) -> Vec<(&'static str, Vec<f64>)> {
         vec![("time constant", vec![self.tau_s])]
-    }
-    fn numbers(&self) -> usize {
-        1
     }
     fn brackets(&self, _: f64) -> Vec<[f64; 2]> {
         vec![[self.tau_s * 0.5, self.tau_s * 2.0]]

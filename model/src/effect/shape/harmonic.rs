@@ -76,9 +76,6 @@ pub(super) fn times(order: f64) -> String {
 }
 
 impl ShapeKind for Harmonic {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn write(&self, keys: &mut KeyWriter) {
         keys.set("order", self.order);
     }
@@ -93,12 +90,6 @@ impl ShapeKind for Harmonic {
     }
     fn order(&self) -> Option<f64> {
         Some(self.order)
-    }
-    fn coefficients(&self) -> usize {
-        2
-    }
-    fn coefficient_names(&self) -> Vec<String> {
-        vec!["cos".into(), "sin".into()]
     }
     fn is_wave(&self) -> bool {
         true

@@ -88,20 +88,28 @@ pub enum Per {
     Slope(f64),
 }
 
-/// Everything that is particular to one shape, except its basis functions: see [`Basis`].
-pub trait ShapeKind {
+/// A shape of the registry.
+pub trait Registered {
     /// Its entry in the registry.
     fn entry(&self) -> &'static Entry;
+}
+
+/// Everything that is particular to one shape, except its basis functions: see [`Basis`].
+pub trait ShapeKind: Registered {
+    /// The motion of a component and its dependence on the driver, in words.
+    fn describe(&self, words: &EffectWords) -> String;
+
     /// Writes its numbers to a file.
-    fn write(&self, keys: &mut KeyWriter);
+    fn write(&self, keys: &mut KeyWriter) {
+        let _ = keys;
+    }
     /// Checks its numbers.
     ///
     /// # Errors
     /// The message names the invalid number and the requirement.
-    fn check(&self) -> Result<(), String>;
-    /// The motion of a component and its dependence on the driver, in words.
-    fn describe(&self, words: &EffectWords) -> String;
-
+    fn check(&self) -> Result<(), String> {
+        Ok(())
+    }
     /// The word in results; that of files unless it says otherwise.
     fn word(&self) -> &'static str {
         self.entry().word
@@ -116,12 +124,13 @@ pub trait ShapeKind {
     }
     /// Number of coefficients.
     fn coefficients(&self) -> usize {
-        1
+        if self.is_wave() { 2 } else { 1 }
     }
     /// Names of the coefficients in identifiers: `cos`, `sin`, `1`, …; empty for a single coefficient.
     fn coefficient_names(&self) -> Vec<String> {
         match self.coefficients() {
             1 => vec![String::new()],
+            _ if self.is_wave() => vec!["cos".into(), "sin".into()],
             several => (1..=several).map(|k| k.to_string()).collect(),
         }
     }
@@ -169,7 +178,7 @@ pub trait ShapeKind {
     /// Number of shape parameters that a search varies, besides the coefficients: a period, a time constant, a width, a
     /// position. The positions of several steps are not counted.
     fn numbers(&self) -> usize {
-        0
+        self.number_names().len()
     }
     /// Spacing of its members in the library in the first of these numbers, for a travel of this length; 0 if there is
     /// none.

@@ -3,7 +3,7 @@
 
 use super::kind::{Basis, Entry, Follows, Per, ShapeKind};
 use super::words::EffectWords;
-use super::{DriverSample, KeyWriter, Shape};
+use super::{DriverSample, Shape};
 use crate::driver::DriverPart;
 use crate::scalar::Nominal;
 
@@ -22,13 +22,6 @@ pub(super) const ENTRY: Entry = Entry {
 };
 
 impl ShapeKind for Lag {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
-    fn write(&self, _: &mut KeyWriter) {}
-    fn check(&self) -> Result<(), String> {
-        Ok(())
-    }
     fn describe(&self, words: &EffectWords) -> String {
         if words.is_positioning {
             "lag behind the command in proportion to the speed".to_string()

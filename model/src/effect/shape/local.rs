@@ -62,9 +62,6 @@ fn members(sampled: &Sampled) -> Vec<(Shape, f64)> {
 }
 
 impl ShapeKind for Local {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn write(&self, keys: &mut KeyWriter) {
         keys.quantity(&CENTRE, self.centre);
         keys.quantity(&WIDTH, self.width);
@@ -94,9 +91,6 @@ impl ShapeKind for Local {
     }
     fn reported(&self) -> Vec<(&'static str, Vec<f64>)> {
         vec![("centre", vec![self.centre]), ("width", vec![self.width])]
-    }
-    fn numbers(&self) -> usize {
-        2
     }
     fn spacing(&self, _: f64) -> f64 {
         self.width

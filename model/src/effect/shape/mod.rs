@@ -7,7 +7,7 @@
 mod kind;
 mod words;
 
-pub use kind::{Basis, Entry, Follows, Per, ShapeKind};
+pub use kind::{Basis, Entry, Follows, Per, Registered, ShapeKind};
 pub use words::EffectWords;
 
 use std::ops::Deref;
@@ -21,6 +21,13 @@ macro_rules! shapes {
     ($($module:ident: $shape:ident $(($numbers:ident))?,)+) => {
         $(mod $module;)+
         $($(pub use $module::$numbers;)?)+
+        $(
+            impl Registered for $module::$shape {
+                fn entry(&self) -> &'static Entry {
+                    &$module::ENTRY
+                }
+            }
+        )+
 
         /// Functional dependence of a component on its driver.
         #[derive(Clone, Debug, PartialEq)]

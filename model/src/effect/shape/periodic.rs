@@ -61,9 +61,6 @@ pub(super) fn bracket(period: f64, spacing: f64) -> [f64; 2] {
 }
 
 impl ShapeKind for Periodic {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn write(&self, keys: &mut KeyWriter) {
         keys.quantity(&PERIOD, self.period);
     }
@@ -73,20 +70,11 @@ impl ShapeKind for Periodic {
     fn describe(&self, words: &EffectWords) -> String {
         format!("{}, repeating every {}{}", words.motion, words.at_value(self.period), words.of_another_axis)
     }
-    fn coefficients(&self) -> usize {
-        2
-    }
-    fn coefficient_names(&self) -> Vec<String> {
-        vec!["cos".into(), "sin".into()]
-    }
     fn is_wave(&self) -> bool {
         true
     }
     fn reported(&self) -> Vec<(&'static str, Vec<f64>)> {
         vec![("period", vec![self.period])]
-    }
-    fn numbers(&self) -> usize {
-        1
     }
     fn spacing(&self, span: f64) -> f64 {
         spacing(self.period, span)

@@ -66,9 +66,6 @@ pub(super) fn per(degree: usize, scale: f64, power: usize) -> Per {
 }
 
 impl ShapeKind for Polynomial {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn write(&self, keys: &mut KeyWriter) {
         write(self.degree, self.scale, keys);
     }

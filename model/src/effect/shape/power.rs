@@ -36,9 +36,6 @@ pub(super) const ENTRY: Entry = Entry {
 const COST_PER_DEGREE: f64 = 0.2;
 
 impl ShapeKind for Power {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn write(&self, keys: &mut KeyWriter) {
         polynomial::write(self.degree, self.scale, keys);
     }

@@ -66,9 +66,6 @@ fn members(sampled: &Sampled) -> Vec<(Shape, f64)> {
 }
 
 impl ShapeKind for Precession {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn write(&self, keys: &mut KeyWriter) {
         keys.set("order", self.order);
         if self.backward {
@@ -91,12 +88,6 @@ impl ShapeKind for Precession {
     }
     fn order(&self) -> Option<f64> {
         Some(if self.backward { -self.order } else { self.order })
-    }
-    fn coefficients(&self) -> usize {
-        2
-    }
-    fn coefficient_names(&self) -> Vec<String> {
-        vec!["cos".into(), "sin".into()]
     }
     fn is_wave(&self) -> bool {
         true

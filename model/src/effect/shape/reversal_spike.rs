@@ -38,9 +38,6 @@ fn members(sampled: &Sampled) -> Vec<(Shape, f64)> {
 }
 
 impl ShapeKind for ReversalSpike {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn write(&self, keys: &mut KeyWriter) {
         keys.quantity(&WIDTH, self.width);
     }
@@ -66,9 +63,6 @@ impl ShapeKind for ReversalSpike {
     }
     fn reported(&self) -> Vec<(&'static str, Vec<f64>)> {
         vec![("width", vec![self.width])]
-    }
-    fn numbers(&self) -> usize {
-        1
     }
     fn brackets(&self, _: f64) -> Vec<[f64; 2]> {
         vec![[self.width * 0.4, self.width * 2.5]]

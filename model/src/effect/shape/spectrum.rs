@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use super::kind::{Basis, Entry, Follows, Per, ShapeKind, positive};
+use super::kind::{Basis, Entry, Follows, ShapeKind, positive};
 use super::words::EffectWords;
 use super::{DriverSample, Key, KeyForm, KeyReader, KeyWriter, Shape};
 use crate::document::Fault;
@@ -55,9 +55,6 @@ impl Spectrum {
 }
 
 impl ShapeKind for Spectrum {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn write(&self, keys: &mut KeyWriter) {
         keys.set("orders", self.orders);
         if self.period != TAU || !keys.unit().is_angle() {
@@ -84,9 +81,6 @@ impl ShapeKind for Spectrum {
     }
     fn coefficient_names(&self) -> Vec<String> {
         (1..=self.orders).flat_map(|k| [format!("cos{k}"), format!("sin{k}")]).collect()
-    }
-    fn per(&self, _: usize) -> Per {
-        Per::One
     }
     fn reported(&self) -> Vec<(&'static str, Vec<f64>)> {
         vec![("period", vec![self.period])]

@@ -44,9 +44,6 @@ fn members(sampled: &Sampled) -> Vec<(Shape, f64)> {
 }
 
 impl ShapeKind for Steps {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn write(&self, keys: &mut KeyWriter) {
         keys.quantities(&AT, &self.at);
     }

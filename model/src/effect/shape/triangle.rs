@@ -27,9 +27,6 @@ pub(super) const ENTRY: Entry = Entry {
 };
 
 impl ShapeKind for Triangle {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn write(&self, keys: &mut KeyWriter) {
         keys.quantity(&PERIOD, self.period);
     }
@@ -48,9 +45,6 @@ impl ShapeKind for Triangle {
     }
     fn reported(&self) -> Vec<(&'static str, Vec<f64>)> {
         vec![("period", vec![self.period])]
-    }
-    fn numbers(&self) -> usize {
-        1
     }
     fn spacing(&self, span: f64) -> f64 {
         periodic::spacing(self.period, span)

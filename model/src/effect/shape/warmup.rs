@@ -33,9 +33,6 @@ pub(super) const ENTRY: Entry = Entry {
 };
 
 impl ShapeKind for Warmup {
-    fn entry(&self) -> &'static Entry {
-        &ENTRY
-    }
     fn write(&self, keys: &mut KeyWriter) {
         keys.set("tau_s", self.tau_s);
     }
@@ -54,9 +51,6 @@ impl ShapeKind for Warmup {
     }
     fn reported(&self) -> Vec<(&'static str, Vec<f64>)> {
         vec![("time constant", vec![self.tau_s])]
-    }
-    fn numbers(&self) -> usize {
-        1
     }
     fn brackets(&self, _: f64) -> Vec<[f64; 2]> {
         vec![[self.tau_s * 0.5, self.tau_s * 2.0]]
