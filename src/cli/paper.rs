@@ -1,21 +1,31 @@
 //! `abbe paper`: text, tables and figures of sessions for LaTeX and Typst.
 
-mod parts;
-mod readme;
+use std::path::{Path, PathBuf};
 
-use std::path::PathBuf;
-
-use abbe::files;
+use abbe::analysis::problem_of;
+use abbe::files::{self, SourceMap};
+use abbe::identify::problem::Problem;
 use abbe::model::Diagnostic;
+use abbe::model::effect::Effect;
+use abbe::model::session::Session;
 use abbe::model::words::counted;
+use abbe::plan::bias::{bias_table, usual_effects};
+use abbe::plan::structure::structure;
+use abbe::plan::{self, PlanOptions};
+use abbe::trace::SessionFit;
+use abbe::trace::candidates::named::effect;
 use clap::Args;
 
+use super::failure::command_line;
 use super::message::print_warnings;
 use super::values::{self, Words};
 use super::{DataArguments, Global, folder, output};
 use crate::printers::paper;
 use crate::printers::paper::layout::{Class, Layout};
-use crate::report::paper::{SUBJECTS, Subject};
+use crate::report::block::Body;
+use crate::report::paper::contents::{self, Study};
+use crate::report::paper::{Part, SUBJECTS, Subject, equations};
+use crate::report::provenance::Provenance;
 
 /// Examples of `abbe paper`.
 pub const HELP: &str = include_str!("help/paper.txt");
@@ -73,14 +83,14 @@ pub fn run(arguments: &PaperArguments, Global { quiet, .. }: Global) -> Result<(
             return Err(Diagnostic::other(format!("{} is named twice; name each session once", path.display())));
         }
         let (session, sources) = files::session_with_sources(path, &arguments.data.options())?;
-        let study = parts::study(arguments, parts::label(&arguments.sessions, path), &session)?;
+        let study = study(arguments, label(&arguments.sessions, path), &session)?;
         let warnings: Vec<String> =
             study.analysis.warnings.iter().map(|warning| format!("{}: {warning}", path.display())).collect();
         print_warnings(&warnings);
         origins.push((session, sources));
         studies.push(study);
     }
-    let sections = parts::parts(arguments, &studies)?;
+    let sections = parts(arguments, &studies)?;
     let layout = Layout { class: arguments.class, two_column: arguments.two_column };
     let machine = &studies[0].problem.session.machine;
     let title = format!("Geometric errors of the {}: tests, identifiability and uncertainty", machine.name);
@@ -90,7 +100,7 @@ pub fn run(arguments: &PaperArguments, Global { quiet, .. }: Global) -> Result<(
         counted(studies.len(), "session"),
     );
     let mut files = paper::files(&title, &summary, &sections, layout).map_err(Diagnostic::other)?;
-    files.push(("README.md".into(), readme::readme(arguments, &origins, &sections)?.into_bytes()));
+    files.push(("README.md".into(), readme(arguments, &origins, &sections)?.into_bytes()));
     folder::write(&arguments.out, &files, arguments.folder.force, |_| Ok(()))?;
     if !quiet {
         let names: Vec<&str> = sections.iter().map(|section| section.subject.word()).collect();
@@ -99,4 +109,121 @@ pub fn run(arguments: &PaperArguments, Global { quiet, .. }: Global) -> Result<(
         say!("typeset: pdflatex main, bibtex main, pdflatex main (three times); or typst compile main.typ");
     }
     Ok(())
+}
+
+/// Effects of the bias table where none are named.
+const BIASING_EFFECTS: usize = 12;
+
+/// A session with its results.
+pub fn study(arguments: &PaperArguments, label: String, session: &Session) -> Result<Study, Diagnostic> {
+    let options = PlanOptions { effects: false, ..PlanOptions::default() };
+    let analysis = plan::analyse(session, &options)?;
+    let problem = problem_of(session, &options)?;
+    let bias = if arguments.effects.is_empty() {
+        bias_table(&problem, &usual_effects(&problem)?)?.largest(BIASING_EFFECTS)
+    } else {
+        bias_table(&problem, &named(&problem, &arguments.effects)?)?
+    };
+    let structure = structure(&problem)?;
+    let measured = session.tests.iter().all(|test| test.readings.is_some());
+    let fitted = if measured { Some(SessionFit::of(session, arguments.seed)?) } else { None };
+    Ok(Study { label, problem, analysis, structure, bias, fitted })
+}
+
+fn named(problem: &Problem, ids: &[String]) -> Result<Vec<Effect>, Diagnostic> {
+    ids.iter().map(|id| effect(problem, id)).collect()
+}
+
+/// The requested parts that the sessions have.
+pub fn parts(arguments: &PaperArguments, studies: &[Study]) -> Result<Vec<Part>, Diagnostic> {
+    let study = &studies[0];
+    let mut sections = Vec::new();
+    for (word, subject) in SUBJECTS {
+        let is_named = arguments.parts.contains(subject);
+        if !arguments.parts.is_empty() && !is_named {
+            continue;
+        }
+        let section = match subject {
+            Subject::Methods => Some(contents::methods(study)),
+            Subject::SetUp => Some(contents::set_up(study)),
+            Subject::Equations => Some(equations::part(study, arguments.two_column)?),
+            Subject::Sensitivity => Some(contents::sensitivity(study)?),
+            Subject::Uncertainty => Some(contents::uncertainty(study)),
+            Subject::Correlation => Some(contents::correlation(study)),
+            Subject::Identifiability => Some(contents::identifiability(study)),
+            Subject::Bias => Some(contents::bias(study)),
+            Subject::Comparison => (studies.len() > 1).then(|| contents::comparison(studies)),
+            Subject::Trace => contents::trace(study)?,
+        };
+        match section {
+            Some(section) => sections.push(section.with_set_up_in_words(&study.problem)),
+            None if is_named && *subject == Subject::Comparison => {
+                return Err(command_line("`--parts comparison` needs at least two sessions; name another"));
+            }
+            None if is_named => {
+                return Err(Diagnostic::other(format!(
+                    "`--parts {word}`: {} has no readings; name a measured session, or leave the part out",
+                    arguments.sessions[0].display()
+                )));
+            }
+            None => {}
+        }
+    }
+    Ok(sections)
+}
+
+/// The name of a session in tables: that of its file, or of its folder if several have the same name.
+pub fn label(sessions: &[PathBuf], path: &Path) -> String {
+    let stem = |path: &Path| path.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
+    let own = stem(path);
+    if sessions.iter().filter(|other| stem(other) == own).count() == 1 {
+        return own;
+    }
+    path.with_extension("").display().to_string()
+}
+
+/// The commands that make the folder and its results again, and the files that were read.
+fn readme(
+    arguments: &PaperArguments,
+    origins: &[(Session, SourceMap)],
+    sections: &[Part],
+) -> Result<String, Diagnostic> {
+    let mut text = String::from("# Files of a paper\n\n## This folder\n\n");
+    let mut inputs = String::new();
+    for (place, (session, sources)) in origins.iter().enumerate() {
+        let found = Provenance::of((session, sources), arguments.seed);
+        if place == 0 {
+            text.push_str(&format!("```sh\n{}\n```\n\n", found.command));
+        }
+        for input in &found.inputs {
+            inputs.push_str(&format!("- `{}`, {} bytes, SHA-256 `{}`\n", input.path, input.bytes, input.sha256));
+        }
+    }
+    text.push_str("## Results\n\n| part | files | command |\n|---|---|---|\n");
+    let first = arguments.sessions[0].display();
+    for section in sections {
+        let command = match section.subject {
+            Subject::Sensitivity => format!("abbe plan {first} --all --patterns patterns.csv"),
+            Subject::Trace => format!("abbe fit {first} --all --residuals residuals.csv --plots plots"),
+            Subject::Methods if section.report.blocks.len() > 3 => format!("abbe fit {first} --json fit.json"),
+            Subject::Equations => {
+                format!("abbe equation {first} --all-tests --order first --form single --nomenclature --as latex")
+            }
+            Subject::Bias => format!("abbe paper {first} --out bias --parts bias"),
+            _ => format!("abbe plan {first} --all --json plan.json"),
+        };
+        let files = section.report.blocks.iter().filter_map(|block| match &block.body {
+            Body::Table(table) => Some(format!("`tables/{}`", table.name)),
+            Body::Figure(figure) => Some(format!("`figures/{}`", figure.name)),
+            _ => None,
+        });
+        let files = files.collect::<Vec<_>>().join(", ");
+        text.push_str(&format!("| {} | {files} | `{command}` |\n", section.subject.word()));
+    }
+    text.push_str(
+        "\nEach table is there for LaTeX, Typst and as CSV. Each figure is there as PDF, as SVG, and its data as CSV, which \
+         pgfplots reads: `\\addplot table [col sep=comma] {figures/NAME.csv};`.\n\n## Typeset\n\n```sh\npdflatex main && \
+         bibtex main && pdflatex main && pdflatex main && pdflatex main\ntypst compile main.typ\n```\n\n## Files that were read\n\n",
+    );
+    Ok(text + &inputs)
 }

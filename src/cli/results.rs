@@ -1,28 +1,31 @@
 //! Where the result of a command goes: screen, JSON, report, CSV, plots. One group of options for all commands.
 
+use std::any::TypeId;
 use std::path::{Path, PathBuf};
 
 use abbe::analysis::Found;
-use abbe::document::{self, Document, Origin};
+use abbe::document::{self, Call, Document, Origin};
 use abbe::files::SourceMap;
 use abbe::files::stamp::FileStamp;
+use abbe::identify::fit::Fit;
 use abbe::identify::model_file::IdentifiedModel;
+use abbe::identify::problem::Problem;
 use abbe::model::Diagnostic;
 use abbe::model::session::Session;
-use clap::Args;
+use clap::{Arg, ArgAction, ArgMatches, Args};
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use super::failure::command_line;
-use super::folder;
-use super::json;
 use super::message::print_warnings;
 use super::output::{self, Outputs};
+use super::{folder, parser};
 use crate::printers::{csv, page, terminal};
 use crate::report::block::Report;
 use crate::report::commands::Commands;
 use crate::report::figure::svg;
 use crate::report::provenance::{Input, Provenance};
+use crate::report::readings;
 
 /// How to see what the first screen folds.
 const MORE: &str = "--all lists them";
@@ -179,7 +182,7 @@ impl OutputArguments {
     ) -> Result<(), Diagnostic> {
         self.show(outputs, report);
         if let Some(path) = &self.json {
-            let text = Document::text(json::command_line(), read.origin(), read.seed, result())?;
+            let text = Document::text(call(), read.origin(), read.seed, result())?;
             output::write_whole(path, text.as_bytes())?;
         }
         if let Some(path) = &self.csv {
@@ -217,4 +220,150 @@ fn write_plots(report: &Report, path: &Path, force: bool) -> Result<(), Diagnost
         }
     }
     folder::write(path, &files, force, |_| Ok(()))
+}
+
+/// The file of the model.
+#[derive(Args, Clone)]
+pub struct SaveArguments {
+    /// Save the identified model (machine, estimates with covariance, effects, noise, range of the data), so that
+    /// `abbe validate` can test it on another session.
+    ///
+    /// Example: --save model.json
+    #[arg(long, value_name = "MODEL")]
+    pub save: Option<PathBuf>,
+}
+
+impl SaveArguments {
+    /// Saves the model of a fit, if it is requested.
+    pub fn run(&self, problem: &Problem, fit: &Fit, sources: &SourceMap, seed: u64) -> Result<(), Diagnostic> {
+        let Some(path) = &self.save else {
+            return Ok(());
+        };
+        let model = IdentifiedModel::of_fit(problem, fit, Origin::of_session(sources).provenance(call(), seed))?;
+        output::write_whole(path, model.to_text()?.as_bytes())
+    }
+}
+
+/// Options of the tables of readings of a fit.
+#[derive(Args)]
+pub struct ReadingArguments {
+    /// Write readings and residuals of an R-test by direction: of the sensors, along X, Y and Z, radial, tangential and
+    /// axial.
+    ///
+    /// Example: --views views.csv
+    #[arg(long, value_name = "FILE.csv")]
+    pub views: Option<PathBuf>,
+    /// Write reading and residual of every reading as CSV: test, run, line, axis positions, reading, residual in µm,
+    /// residual over the noise standard deviation, and whether the reading counts or is an outlier; of the full fit.
+    ///
+    /// Example: --residuals residuals.csv
+    #[arg(long, value_name = "FILE.csv")]
+    pub residuals: Option<PathBuf>,
+}
+
+impl ReadingArguments {
+    /// Writes the tables that are asked for.
+    pub fn write(&self, problem: &Problem, fit: &Fit) -> Result<(), Diagnostic> {
+        if let Some(path) = &self.views {
+            output::write_whole(path, &output::csv(&readings::by_direction(problem, fit)?)?)?;
+        }
+        if let Some(path) = &self.residuals {
+            output::write_whole(path, &output::csv(&readings::residuals(problem, fit))?)?;
+        }
+        Ok(())
+    }
+}
+
+/// The name of the command, and the options on the command line of this process.
+pub fn call() -> Call {
+    let mut parser = parser();
+    // The command line has been parsed before.
+    let Ok(mut matches) = parser.clone().try_get_matches_from(std::env::args_os()) else {
+        return Call::default();
+    };
+    let mut name = String::new();
+    // Of `fleet run` the command is `run`.
+    while let Some((inner, own)) = matches.remove_subcommand() {
+        parser = parser.find_subcommand(&inner).cloned().unwrap_or_default();
+        (name, matches) = (inner, own);
+    }
+    Call { command: name, options: options(&parser, &matches) }
+}
+
+/// Options that have a field of their own, or that change no result.
+const LEFT_OUT: [&str; 3] = ["json", "quiet", "seed"];
+
+/// The options of a command line, typed as the program reads them.
+fn options(command: &clap::Command, matches: &ArgMatches) -> Map<String, Value> {
+    let mut options = Map::new();
+    for argument in command.get_arguments() {
+        let id = argument.get_id().as_str();
+        let Some(long) = argument.get_long().filter(|long| !LEFT_OUT.contains(long)) else {
+            continue;
+        };
+        if matches.value_source(id) != Some(clap::parser::ValueSource::CommandLine) {
+            continue;
+        }
+        let value = if matches!(argument.get_action(), ArgAction::SetTrue) {
+            Value::Bool(true)
+        } else {
+            let raw = matches.get_raw(id).into_iter().flatten();
+            let mut values: Vec<Value> = raw.map(|value| typed(argument, &value.to_string_lossy())).collect();
+            match values.len() {
+                1 if !takes_several(argument) => values.remove(0),
+                _ => Value::Array(values),
+            }
+        };
+        options.insert(long.replace('-', "_"), value);
+    }
+    options
+}
+
+fn takes_several(argument: &Arg) -> bool {
+    let several = argument.get_num_args().is_some_and(|range| range.max_values() > 1);
+    several || argument.get_value_delimiter().is_some() || matches!(argument.get_action(), ArgAction::Append)
+}
+
+/// A value as a number where the program reads a number, else as a string.
+fn typed(argument: &Arg, text: &str) -> Value {
+    let read = argument.get_value_parser().type_id();
+    let whole = [TypeId::of::<usize>(), TypeId::of::<u64>(), TypeId::of::<u32>()];
+    let number = if whole.iter().any(|kind| read == *kind) {
+        text.parse::<u64>().ok().map(Value::from)
+    } else if read == TypeId::of::<f64>() {
+        text.parse::<f64>().ok().map(Value::from)
+    } else {
+        None
+    };
+    number.unwrap_or_else(|| Value::from(text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn options_have_the_types_that_the_program_reads() {
+        let parser = super::parser();
+        let line = [
+            "abbe",
+            "trace",
+            "s.toml",
+            "--max-effects",
+            "2",
+            "--only",
+            "EZC",
+            "--only",
+            "~time",
+            "--json",
+            "t.json",
+            "--seed",
+            "3",
+        ];
+        let matches = parser.clone().try_get_matches_from(line).unwrap();
+        let (name, own) = matches.subcommand().unwrap();
+        let found = options(parser.find_subcommand(name).unwrap(), own);
+        assert_eq!(Value::Object(found), json!({"max_effects": 2, "only": ["EZC", "~time"]}));
+    }
 }

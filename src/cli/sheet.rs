@@ -1,19 +1,20 @@
 //! `abbe sheet`: set-up sheets of the planned tests.
 
-mod order;
-
 use std::path::PathBuf;
 
-use abbe::codegen::nc::Control;
+use abbe::codegen::nc::{self, Control, NcFiles};
 use abbe::model::Diagnostic;
+use abbe::model::session::Session;
 use abbe::model::words::counted;
-use abbe::plan::sheet::{SetUpTimes, sheets};
+use abbe::plan::collision;
+use abbe::plan::sheet::{SetUpTimes, TestSheet, sheets};
 use clap::Args;
 
 use super::message::print_warnings;
-use super::nc::motion::{self, MotionArguments};
+use super::nc::{MotionArguments, controls};
 use super::{Global, SessionArguments, output, values};
 use crate::printers::sheet as present;
+use crate::printers::sheet::Order;
 
 /// Examples of `abbe sheet`.
 pub const HELP: &str = include_str!("help/sheet.txt");
@@ -51,7 +52,7 @@ pub struct SheetArguments {
     /// The control of the NC programs: the sheets name them.
     ///
     /// Example: --control fanuc
-    #[arg(long, value_name = "CONTROL", value_parser = motion::controls())]
+    #[arg(long, value_name = "CONTROL", value_parser = controls())]
     control: Option<&'static dyn Control>,
     #[command(flatten)]
     motion: MotionArguments,
@@ -74,7 +75,7 @@ pub fn run(arguments: &SheetArguments, Global { quiet, .. }: Global) -> Result<(
     let basic_bar_mm = arguments.bar_mm.or(bars.reduce(f64::min));
     let sheets = sheets(&session, times, basic_bar_mm)?;
     let source = sources.file.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let order = order::order(&session, &sheets, arguments, source, basic_bar_mm)?;
+    let order = order(&session, &sheets, arguments, source, basic_bar_mm)?;
     let page = present::html(&session, &sheets, &order);
     print_warnings(&order.warnings);
     output::write_whole(&arguments.out, page.as_bytes())?;
@@ -82,4 +83,53 @@ pub fn run(arguments: &SheetArguments, Global { quiet, .. }: Global) -> Result<(
         say!("{}: {}, one page each, and an overview", arguments.out.display(), counted(sheets.len(), "test"));
     }
     Ok(())
+}
+
+/// The programs of the sheets, if the plan has some: poses and robots have none. Without a stated control, the motion is that
+/// of one without an increment, the names are left out, and what forbids programs is a warning.
+fn programs(
+    session: &Session,
+    arguments: &SheetArguments,
+    warnings: &mut Vec<String>,
+) -> Result<Option<(&'static dyn Control, NcFiles)>, Diagnostic> {
+    let control = arguments.control.map_or_else(|| nc::control("linuxcnc"), Ok)?;
+    if arguments.control.is_none() && !nc::has_programs(session) {
+        return Ok(None);
+    }
+    match nc::files(session, control, &arguments.motion.options()) {
+        Ok(programs) => Ok(Some((control, programs))),
+        Err(error) if arguments.control.is_some() => Err(error),
+        Err(error) => {
+            warnings.push(format!("no program can be written: {error}"));
+            Ok(None)
+        }
+    }
+}
+
+/// The order of work of these sheets.
+pub fn order(
+    session: &Session,
+    sheets: &[TestSheet],
+    arguments: &SheetArguments,
+    source: String,
+    basic_bar_mm: Option<f64>,
+) -> Result<Order, Diagnostic> {
+    let mut warnings = session.warnings.clone();
+    let programs = programs(session, arguments, &mut warnings)?;
+    warnings.extend(collision::unchecked(session, true));
+    let clearances: Vec<_> = sheets.iter().filter_map(|sheet| sheet.clearance.clone()).collect();
+    warnings.extend(collision::warnings(session, &clearances));
+    if let Some((_, programs)) = &programs {
+        warnings.extend(programs.warnings.iter().cloned());
+        warnings.extend(collision::warnings_of_moves(session, &programs.moves));
+    }
+    Ok(Order {
+        source,
+        control: programs.as_ref().map(|(control, _)| *control).filter(|_| arguments.control.is_some()),
+        main: programs.as_ref().and_then(|(_, programs)| programs.files.first()).map(|(name, _)| name.clone()),
+        number: arguments.motion.options().number(),
+        runs: programs.map_or(Vec::new(), |(_, programs)| programs.runs),
+        basic_bar_mm,
+        warnings,
+    })
 }
