@@ -23,7 +23,7 @@ pub mod program;
 
 use abbe_model::Diagnostic;
 use abbe_model::chain::Machine;
-use abbe_model::session::moves::Moves;
+use abbe_model::session::Moves;
 use abbe_model::session::{Session, Test};
 use abbe_model::words::listed;
 

@@ -5,8 +5,8 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::{BodyErrors, Frame, Machine};
 use abbe_model::frames::Point;
 use abbe_model::instrument::ballbar::BallBar;
-use abbe_model::session::moves::{Mounted, Moves};
 use abbe_model::session::placing::{balls, positions_for_bar};
+use abbe_model::session::{Mounted, Moves};
 use abbe_model::session::{Session, Test};
 
 use super::block::Block;

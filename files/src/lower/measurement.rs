@@ -12,7 +12,7 @@ use abbe_model::document::schema;
 use abbe_model::document::value;
 use abbe_model::instrument::set_up::SetUp;
 use abbe_model::instrument::{InstrumentKind, Station, kinds};
-use abbe_model::session::contributors::Contributors;
+use abbe_model::session::Contributors;
 use abbe_model::session::expression::Length;
 use abbe_model::session::{Test, planned};
 use abbe_model::unit::Unit;

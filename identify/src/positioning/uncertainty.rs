@@ -17,7 +17,7 @@
 //!
 //! With five runs `U(R↑) = 2 U_environment`.
 
-use abbe_model::session::contributors::Contributors;
+use abbe_model::session::Contributors;
 use schemars::JsonSchema;
 use serde::Serialize;
 

@@ -8,7 +8,7 @@ use super::movement::{Path, Sweep};
 use super::node::{Named, Node};
 use super::value::Length;
 use crate::instrument::InstrumentKind;
-use crate::session::contributors::Contributors;
+use crate::session::Contributors;
 
 /// A test.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]

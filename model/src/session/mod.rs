@@ -3,11 +3,9 @@
 //! A session is validated and in mm, rad and s. The crate `abbe-files` reads it, from files or memory,
 //! and writes it.
 
-pub mod contributors;
 pub mod expression;
 pub mod limits;
 pub mod motion;
-pub mod moves;
 pub mod placing;
 pub mod planned;
 pub mod readings;
@@ -16,17 +14,21 @@ pub mod trajectory;
 
 use std::sync::Arc;
 
+use expression::Constant;
+use readings::Readings;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use tolerance::Tolerance;
+
 use crate::body::ClearanceSizes;
 use crate::chain::Machine;
 use crate::component::ErrorName;
 use crate::document::node::Node;
+use crate::document::value::NotNegative;
 use crate::driver::Reference;
 use crate::effect::Effect;
 use crate::instrument::{Entry, InstrumentKind, InstrumentParameter, SharedBy, Station};
 use crate::unit::{ARCSEC_PER_RAD, MM_PER_UM, Unit};
-use expression::Constant;
-use readings::Readings;
-use tolerance::Tolerance;
 
 /// The lever at which one arcsecond is one micrometre, mm.
 pub const NATURAL_LEVER_MM: f64 = MM_PER_UM * ARCSEC_PER_RAD;
@@ -245,7 +247,7 @@ pub struct Test {
     /// The same as expressions, for linear axes stated in mm; equations keep them as symbols.
     pub at_written: Vec<Option<expression::Length>>,
     /// Contributors to the measurement uncertainty of positioning figures.
-    pub contributors: Option<contributors::Contributors>,
+    pub contributors: Option<Contributors>,
     /// The measured readings.
     pub readings: Option<Arc<Readings>>,
 }
@@ -311,4 +313,59 @@ pub struct SocketDistance {
     pub distance_mm: f64,
     /// Its standard uncertainty, mm.
     pub u_mm: f64,
+}
+
+/// What is between the balls of a ball bar.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mounted {
+    /// The bar.
+    Bar,
+    /// Nothing.
+    Nothing,
+    /// The cup of the spindle holds the workpiece ball, or is about to: the two holders meet.
+    BallInCup,
+}
+
+/// Moves that follow each other: the axes go straight from state to state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Moves {
+    /// The test.
+    pub test: String,
+    /// What the moves are for: `approach`, `centring`, `feed-in`, `overshoot`, `retreat`.
+    pub stage: &'static str,
+    /// Positions of all axes, mm or rad.
+    pub states: Vec<Vec<f64>>,
+    /// What is mounted.
+    pub mounted: Mounted,
+}
+
+/// Contributors to the measurement uncertainty of the positioning figures of a laser or a sensor of angles. What is absent
+/// is 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename = "contributors", deny_unknown_fields)]
+pub struct Contributors {
+    /// Standard uncertainty of the calibrated laser, the part that no length changes.
+    pub device_u_um: Option<NotNegative>,
+    /// Standard uncertainty of the calibrated laser in proportion to the length, µm/m.
+    pub device_u_um_m: Option<NotNegative>,
+    /// Standard uncertainty of the calibrated sensor of angles.
+    pub device_u_arcsec: Option<NotNegative>,
+    /// Lateral deviation of the beam over the measured length, mm.
+    pub misalignment_mm: Option<NotNegative>,
+    /// Coefficient of thermal expansion by which readings refer to 20 °C, µm/(m·K).
+    pub expansion_um_m_k: Option<NotNegative>,
+    /// Its standard uncertainty.
+    pub expansion_u_um_m_k: Option<NotNegative>,
+    /// Deviation of the temperature from 20 °C, K.
+    pub temperature_difference_k: Option<NotNegative>,
+    /// Standard uncertainty of the measured temperature, K.
+    pub temperature_u_k: Option<NotNegative>,
+    /// Environmental variation: the range of the readings of a drift test as long as the test.
+    pub environment_um: Option<NotNegative>,
+    /// The same of a sensor of angles.
+    pub environment_arcsec: Option<NotNegative>,
+    /// Standard uncertainty of the repeated set-up.
+    pub setup_u_um: Option<NotNegative>,
+    /// The same of a sensor of angles.
+    pub setup_u_arcsec: Option<NotNegative>,
 }

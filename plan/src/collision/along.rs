@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use abbe_model::axis::{Axis, AxisKind};
-use abbe_model::session::moves::{Mounted, Moves};
 use abbe_model::session::readings::Readings;
+use abbe_model::session::{Mounted, Moves};
 
 use super::TestClearance;
 use super::parts::{Compared, Found, Parts};

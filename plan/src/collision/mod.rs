@@ -18,7 +18,7 @@ mod shape;
 use std::collections::BTreeMap;
 
 use abbe_model::Diagnostic;
-use abbe_model::session::moves::Moves;
+use abbe_model::session::Moves;
 use abbe_model::session::{Session, Test};
 use schemars::JsonSchema;
 use serde::Serialize;

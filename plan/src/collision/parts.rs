@@ -7,7 +7,7 @@ use abbe_model::body::{ClearanceSizes, Holder};
 use abbe_model::chain::{Frame, Machine};
 use abbe_model::instrument::Target;
 use abbe_model::instrument::ballbar::BallBar;
-use abbe_model::session::moves::Mounted;
+use abbe_model::session::Mounted;
 use abbe_model::session::{Session, Test};
 use parry3d_f64::math::{Pose, Vector};
 
