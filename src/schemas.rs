@@ -10,7 +10,7 @@ use abbe_identify::self_calibration::SelfCalibration;
 use abbe_identify::simulate::SimulationResult;
 use abbe_model::document::schema;
 use abbe_plan::global::GlobalAnalysis;
-use abbe_plan::next::NextTest;
+use abbe_plan::improve::NextTest;
 use abbe_plan::poses::PoseSelection;
 use schemars::JsonSchema;
 use serde_json::Value;

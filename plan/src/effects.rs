@@ -11,13 +11,6 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use abbe_model::Diagnostic;
-use abbe_model::effect::shape::Harmonic;
-use abbe_model::effect::{Effect, Shape};
-use faer::{Mat, MatRef};
-
-use super::detectability::{POWER, SIGNIFICANCE, corrected};
-use super::results::{Bias, Detectability, EffectDetectability, EffectsAnalysis};
 use abbe_identify::linear::{Linearisation, is_of_interest};
 use abbe_identify::numerics::parallel;
 use abbe_identify::numerics::power::noncentrality;
@@ -27,8 +20,14 @@ use abbe_identify::numerics::tolerances::ROUNDING_OF_SQUARES;
 use abbe_identify::parameters::physical_size;
 use abbe_identify::problem::Problem;
 use abbe_identify::unit::ParameterUnit;
+use abbe_model::Diagnostic;
+use abbe_model::effect::shape::Harmonic;
+use abbe_model::effect::{Effect, Shape};
 use abbe_trace::candidates::columns::{Columns, EffectColumns, chunked};
 use abbe_trace::candidates::library::{self, LibraryEffect};
+use faer::{Mat, MatRef};
+
+use super::results::{Bias, Detectability, EffectDetectability, EffectsAnalysis};
 
 /// Share of the signal below which an effect counts as confounded.
 const CONFOUNDED_BELOW: f64 = 0.01;
@@ -272,4 +271,26 @@ pub fn confounded_by_error(analysis: &EffectsAnalysis) -> BTreeMap<String, Vec<(
 /// `um/arcsec`, `um/(um/h)`.
 fn per(above: &str, below: &str) -> String {
     if below.contains('/') { format!("{above}/({below})") } else { format!("{above}/{below}") }
+}
+
+/// Probability of a false alarm.
+pub(crate) const SIGNIFICANCE: f64 = 0.01;
+/// Probability of detecting an effect that is present.
+pub(crate) const POWER: f64 = 0.95;
+
+/// The significance of one of `tests` tests if `SIGNIFICANCE` is that of all together (Šidák, J. Am. Stat. Assoc. 62
+/// (1967) 626). Similar candidates count as one test each, so that the true significance is smaller.
+pub fn corrected(tests: usize) -> f64 {
+    -f64::exp_m1(f64::ln_1p(-SIGNIFICANCE) / tests.max(1) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_test_has_the_significance_itself() {
+        assert!((corrected(1) - SIGNIFICANCE).abs() < 1e-15);
+        assert!((1.0 - (1.0 - corrected(1000)).powi(1000) - SIGNIFICANCE).abs() < 1e-12);
+    }
 }

@@ -1,10 +1,14 @@
 //! Selects the next tests from the candidate tests by their information ([`design`](super::design)). Nothing is refitted.
 
 use abbe_identify::error;
+use abbe_identify::noise::ReadingNoise;
+use abbe_identify::numerics::ranking::smallest_first;
+use abbe_identify::problem::Problem;
 use abbe_model::Diagnostic;
 use abbe_model::document::measurement::Test as Document;
 use abbe_model::document::print::Block;
 use abbe_model::parameter_id::ParameterId;
+use abbe_trace::candidates::named;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -13,10 +17,8 @@ use super::design::exchange::is_no_gain;
 use super::design::information::{Root, SharedParameters};
 use super::design::{Design, Goal, bound};
 use super::proposal::{self, proposal};
+use super::range::Shrinkage;
 use super::variations::TestVariations;
-use abbe_identify::numerics::ranking::smallest_first;
-use abbe_identify::problem::Problem;
-use abbe_trace::candidates::named;
 
 /// Options of the selection of next tests.
 #[derive(Clone, Debug)]
@@ -326,4 +328,25 @@ fn named_uncertainties(shared: &SharedParameters, root: &Root) -> Vec<(Parameter
             (shared.ids[first + j].clone(), u_reported)
         })
         .collect()
+}
+
+/// Proposed tests, and ranges that suffice.
+#[derive(Serialize, JsonSchema)]
+pub struct NextTest {
+    /// The noise of a reading.
+    #[serde(flatten)]
+    pub noise: ReadingNoise,
+    /// The proposed tests.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub improvement: Option<Improvement>,
+    /// The smallest ranges of sweeps.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub ranges: Vec<Shrinkage>,
+}
+
+impl NextTest {
+    /// Of a plan.
+    pub fn new(problem: &Problem, improvement: Option<Improvement>, ranges: Vec<Shrinkage>) -> NextTest {
+        NextTest { noise: problem.reading_noise(), improvement, ranges }
+    }
 }

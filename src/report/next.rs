@@ -4,7 +4,7 @@ use abbe::identify::problem::Problem;
 use abbe::identify::results::Interval;
 use abbe::model::words::{counted, listed};
 use abbe::plan::improve::Improvement;
-use abbe::plan::next::NextTest;
+use abbe::plan::improve::NextTest;
 use abbe::plan::range::Shrinkage;
 
 use super::block::{Level, Report, Text};

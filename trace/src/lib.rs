@@ -47,7 +47,6 @@
 pub mod alias;
 pub mod candidates;
 mod constants;
-mod freed;
 mod implausible;
 pub mod interrupt;
 mod judge;

@@ -22,7 +22,6 @@ mod inputs;
 pub mod results;
 mod shared;
 mod single;
-mod statements;
 pub mod workspace;
 
 use std::collections::BTreeMap;
@@ -37,9 +36,9 @@ use abbe_identify::numerics::symmetric::Symmetric;
 use abbe_identify::numerics::tails::{chi_square_tail, normal_tail};
 use abbe_trace::validate::machine::differences;
 pub use inputs::{Input, compare_inputs};
+pub use results::ComparisonStatement;
 use results::{Comparison, Difference, NotComparable, OnlyIn, Pair};
 use shared::SharedDifference;
-pub use statements::ComparisonStatement;
 
 /// Probability of any false claim of a difference between two models, if the caller states none.
 pub const SIGNIFICANCE: f64 = 0.05;

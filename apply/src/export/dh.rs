@@ -9,7 +9,7 @@
 //! J. Robotic Systems 2 (1985) 397): it is 0 unless two consecutive axes are nearly parallel, where the common normal is
 //! ill-defined. `B` is the pose of the first frame in R, `F` that of the tool frame in the last one.
 //!
-//! The nominal table is the maker's own, or one that follows from the nominal machine (`dh_nominal`). The frames of
+//! The nominal table is the maker's own, or one that follows from the nominal machine (`dh_frames`). The frames of
 //! the calibrated table are those of its lines that lie nearest to the nominal ones (`dh_frames`).
 
 use abbe_files::robot::dh::{Convention, Table};
@@ -23,7 +23,6 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::dh_frames::{self, Frames};
-use super::dh_nominal;
 use super::entries::best_locations;
 use super::frames::{roll_pitch_yaw, tool_side};
 use crate::error::unrepresentable;
@@ -164,7 +163,7 @@ pub fn tables(
     let design = tool_side(machine, &zero, tool_mm)?;
     let nominal = match own {
         Some(table) => of_maker(model, table, convention, design.at_zero().1)?,
-        None => dh_nominal::frames(&design),
+        None => dh_frames::frames(&design),
     };
     let of_errors = |errors: &[f64]| -> Result<(DhTable, Vec<f64>), Diagnostic> {
         let branch = tool_side(machine, errors, tool_mm)?;

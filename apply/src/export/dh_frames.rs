@@ -7,6 +7,8 @@
 use abbe_files::robot::dh::{Convention, Table};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
+use super::frames::Branch;
+
 /// Sine of the angle between two axes below which they count as parallel.
 pub(super) const PARALLEL: f64 = 0.02;
 /// Length below which a normal has no direction, mm.
@@ -175,4 +177,41 @@ pub(super) fn pose(origin: Vector3<f64>, x: Vector3<f64>, z: Vector3<f64>) -> Is
     let x = across(x).or_else(|| across(least)).unwrap_or(least);
     let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, z.cross(&x), z]));
     Isometry3::from_parts(Translation3::from(origin), UnitQuaternion::from_rotation_matrix(&rotation))
+}
+
+/// The frames of a branch: the first at the axis' own point, each further one where the one before meets its axis, unless the
+/// common normal decides. Rows before the first and behind the last axis are empty.
+pub(super) fn frames(branch: &Branch) -> Frames {
+    let (lines, end) = branch.at_zero();
+    let mut own: Vec<Isometry3<f64>> = Vec::with_capacity(lines.len());
+    for (k, &(point, z)) in lines.iter().enumerate() {
+        // Where the frame lies along its axis if nothing else decides.
+        let met = match own.last() {
+            Some(before) => meets(before.translation.vector, lines[k - 1].1, point, z),
+            None => point,
+        };
+        let (origin, x) = match lines.get(k + 1) {
+            None => (met, Vector3::zeros()),
+            Some((next, next_z)) => {
+                let across = z.cross(next_z);
+                match across.norm() >= PARALLEL {
+                    true => (foot(point, z, *next, *next_z), across),
+                    false => (met, meets(met, z, *next, *next_z) - met),
+                }
+            }
+        };
+        own.push(pose(origin, x, z));
+    }
+    let tool = own.last().map_or(end, |last| last.inverse() * end);
+    let base = own.first().copied().unwrap_or_else(Isometry3::identity);
+    Frames { base, first: [0.0; 2], last: [0.0; 2], own, tool }
+}
+
+/// The point of a line in the plane through `origin` across `z`.
+fn meets(origin: Vector3<f64>, z: Vector3<f64>, point: Vector3<f64>, direction: Vector3<f64>) -> Vector3<f64> {
+    let along = direction.dot(&z);
+    if along.abs() < PARALLEL {
+        return point;
+    }
+    point + direction * ((origin - point).dot(&z) / along)
 }

@@ -12,7 +12,6 @@
 
 pub mod dh;
 mod dh_frames;
-mod dh_nominal;
 pub mod entries;
 pub mod frames;
 pub mod kinematics;

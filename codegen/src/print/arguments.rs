@@ -2,8 +2,8 @@
 //! their name in ISO 230-1 with the default 0.
 
 use crate::equation::Equation;
+use crate::print::AngleUnit;
 use crate::print::notes;
-use crate::print::style::AngleUnit;
 use crate::program::Input;
 use crate::variable::Variable;
 

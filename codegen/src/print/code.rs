@@ -9,7 +9,7 @@ use crate::form::Kind;
 use crate::print::arguments::{self, Argument};
 use crate::print::dialect::{self, Dialect};
 use crate::print::notes;
-use crate::print::style::{Layout, Style};
+use crate::print::{Layout, Style};
 use crate::program::{Input, Label, Program};
 use crate::symbol::Unary;
 use crate::variable::{Symbols, Variable, identifier};

@@ -3,7 +3,7 @@
 use crate::check::Checked;
 use crate::print::code::{Code, GROUPS, Syntax, functions, lines, name};
 use crate::print::language::Language;
-use crate::print::style::{Layout, Style};
+use crate::print::{Layout, Style};
 use crate::symbol::Unary;
 
 /// Julia 1.9 or later, without packages.

@@ -1,7 +1,7 @@
 //! What every output language implements.
 
 use crate::check::Checked;
-use crate::print::style::Style;
+use crate::print::Style;
 use crate::print::system::TestEquations;
 
 /// A language in which equations are printed.

@@ -3,9 +3,9 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::check::Checked;
+use crate::print::Style;
 use crate::print::language::Language;
 use crate::print::notation::{Notation, decimal, juxtaposed};
-use crate::print::style::Style;
 use crate::print::system::{Block, TestEquations};
 use crate::print::tex_width;
 use crate::print::typeset::{Markup, page, system};

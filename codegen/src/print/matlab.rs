@@ -4,7 +4,7 @@ use crate::check::Checked;
 use crate::print::arguments::Argument;
 use crate::print::code::{Code, GROUPS, Syntax, lines, name};
 use crate::print::language::Language;
-use crate::print::style::{Layout, Style};
+use crate::print::{Layout, Style};
 use crate::symbol::Unary;
 
 /// MATLAB or Octave.

@@ -15,7 +15,6 @@ mod notation;
 mod notes;
 mod python;
 mod rust;
-mod style;
 mod symbolic;
 mod system;
 mod tex_width;
@@ -23,17 +22,16 @@ mod text;
 mod typeset;
 mod typst;
 
+use Audience::{Algebra, Authors, Compilers, Readers};
 use abbe_model::Diagnostic;
 use abbe_model::effect::{Effect, Shape};
+pub use language::Language;
+pub use system::TestEquations;
 
 use crate::check::Checked;
 use crate::equation::Equation;
 use crate::error;
 use crate::form::{Kind, Order};
-
-pub use language::Language;
-pub use style::{AngleUnit, Layout, Numbering, Style};
-pub use system::TestEquations;
 
 /// Whom a language addresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +45,6 @@ pub enum Audience {
     /// Computer algebra: functions of named symbols.
     Algebra,
 }
-use Audience::{Algebra, Authors, Compilers, Readers};
 
 /// One line of the registry.
 pub struct OutputLanguage {
@@ -179,4 +176,53 @@ fn refuse_unreadable(equation: &Equation) -> Result<(), Diagnostic> {
         "the derivatives of {what} are written as code only: as {languages}; at zero errors they equal the first-order \
          coefficients"
     )))
+}
+
+/// Which equations have a number and a label.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Numbering {
+    /// None.
+    #[default]
+    None,
+    /// That of the reading.
+    Last,
+    /// Every one.
+    All,
+}
+
+/// The arguments of printed code.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Layout {
+    /// Named arguments: lengths, axis positions, and errors with the default 0.
+    #[default]
+    Named,
+    /// Three arrays: lengths, sines and cosines, errors. For kernels over columns of readings.
+    Flat,
+}
+
+/// The unit of axis positions in named arguments.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum AngleUnit {
+    /// rad
+    #[default]
+    Radian,
+    /// °
+    Degree,
+}
+
+/// How an equation is set or called. A language ignores what does not concern it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Style {
+    /// Which equations have a number, in LaTeX and Typst.
+    pub numbering: Numbering,
+    /// Width of a line in LaTeX (at 10 pt) and Typst (at 11 pt), mm; by default that of an article in one column.
+    pub width_mm: Option<f64>,
+    /// Whether a table of symbols follows, in LaTeX and Typst.
+    pub nomenclature: bool,
+    /// The arguments of code.
+    pub layout: Layout,
+    /// The unit of axis positions in named arguments.
+    pub angles: AngleUnit,
+    /// Whether the names of functions end in that of the test, so that code of several tests lies side by side.
+    pub name_of_test: bool,
 }

@@ -1,9 +1,9 @@
 //! Expressions for SymPy and CasADi: Python functions over symbols, with named arguments.
 
 use crate::check::Checked;
+use crate::print::Style;
 use crate::print::code::{Code, Syntax, functions, lines, name};
 use crate::print::language::Language;
-use crate::print::style::Style;
 use crate::symbol::Unary;
 
 /// SymPy expressions.

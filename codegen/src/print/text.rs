@@ -3,13 +3,13 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::check::Checked;
+use crate::print::Style;
 use crate::print::article::Article;
 use crate::print::article::line::NoteKind;
 use crate::print::dialect;
 use crate::print::language::Language;
 use crate::print::notation::{Notation, Spelling, decimal};
 use crate::print::notes;
-use crate::print::style::Style;
 use crate::print::system::{self, TestEquations};
 use crate::symbol::Unary;
 use crate::tree::terms_of;

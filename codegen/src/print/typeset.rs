@@ -7,9 +7,9 @@ use crate::print::article::line::{EquationLine, LeftSide, NoteKind};
 use crate::print::dialect::{self, PRODUCT};
 use crate::print::notation::{Notation, Spelling};
 use crate::print::notes;
-use crate::print::style::{Numbering, Style};
 use crate::print::system::{self, Block, TestEquations};
 use crate::print::tex_width::POINTS_PER_MM;
+use crate::print::{Numbering, Style};
 use crate::tree::terms_of;
 
 /// The commands of a typesetting language around the expressions. Widths are in 1/100 pt.

@@ -143,8 +143,8 @@ pub(crate) fn add(session: &mut Session, parts: &Parts, surroundings: &Surroundi
             parts: parts.iter().map(|test| test.name.clone()).collect(),
         });
         for test in parts {
-            found.warnings.extend(check::setups::differing(&tests, &test));
-            found.warnings.extend(check::setups::repeated(&tests, &test));
+            found.warnings.extend(check::differing(&tests, &test));
+            found.warnings.extend(check::repeated(&tests, &test));
             tests.push(test);
         }
     }

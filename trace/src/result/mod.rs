@@ -5,7 +5,6 @@ mod curve;
 mod effect;
 mod poses;
 mod prediction;
-mod rejected;
 mod reported;
 mod verdict;
 
@@ -13,11 +12,22 @@ use abbe_identify::fit::{self, Fit, JudgedBy, prepare_with};
 use abbe_identify::problem::Problem;
 use abbe_identify::results::{Estimate, ParameterChange};
 use abbe_model::Diagnostic;
+use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::words::listed;
+pub(super) use build::unsearched;
+use build::{Model, Searched, Statements, build};
+pub use effect::effect_name;
+pub(super) use effect::effective_parameters;
 use faer::prelude::Solve;
 use faer::{Mat, Side};
+pub(super) use poses::{PosesEnded, outcome_of_poses};
+pub use reported::{
+    AliasResult, AlternativeResult, CurvePoint, EffectName, EffectResult, LargestOrder, PriorResult, RejectedCandidate,
+    Remainder, SeparatingTestResult, SeparationResult, ShapeParameter, TraceResult,
+};
+use verdict::verdict;
 
 use super::TraceOutcome;
 use super::alias::{self, Alias, CompetingEffect};
@@ -27,16 +37,7 @@ use super::state::{ALL, SearchState};
 use crate::candidates::gain::Projected;
 use crate::candidates::library;
 use crate::constants::MORE_PROBABLE;
-pub(super) use build::unsearched;
-use build::{Model, Searched, Statements, build};
-pub use effect::effect_name;
-pub(super) use effect::effective_parameters;
-pub(super) use poses::{PosesEnded, outcome_of_poses};
-pub use reported::{
-    AliasResult, AlternativeResult, CurvePoint, EffectName, EffectResult, LargestOrder, PriorResult, RejectedCandidate,
-    Remainder, SeparatingTestResult, SeparationResult, ShapeParameter, TraceResult,
-};
-use verdict::verdict;
+use crate::paired::HeldOutDecrease;
 
 /// Share of a signal that remains beside the declared model below which the model contains it.
 const CONTAINED: f64 = 0.01;
@@ -173,7 +174,7 @@ pub(super) fn report(findings: &TraceFindings<'_>) -> Result<ReportedEffect, Dia
         verdict,
         remainder,
         residual_before: residual_before(before, findings.structure_before, !search.selected().is_empty()),
-        rejected: rejected::candidates(&before.session.machine, search, &held_out),
+        rejected: candidates(&before.session.machine, search, &held_out),
         candidates: [findings.candidates, findings.candidates_seen],
         searched: Searched { families: searched_families(search, &families), presumed: presumed(search, before)? },
         interrupted: findings.interrupted,
@@ -417,6 +418,32 @@ fn changed_parameters(before: &[Estimate], after: &[Estimate]) -> Vec<ParameterC
             })
         })
         .collect()
+}
+
+/// Candidates beyond the null distribution of the search that are rejected, because the held-out error does not
+/// decrease by more than its standard error.
+fn candidates(machine: &Machine, search: &SearchState<'_>, held_out: &HeldOut<'_>) -> Vec<RejectedCandidate> {
+    let rejected = search.rejected.iter().map(|rejected| {
+        let (heldout_decrease_um, u_heldout_decrease_um) = held_out.decrease_um(rejected.decrease);
+        RejectedCandidate {
+            name: effect_name(machine, search.effect(rejected.selected.candidate)),
+            p_value: rejected.selected.p_value,
+            heldout_decrease_um,
+            u_heldout_decrease_um,
+        }
+    });
+    rejected.collect()
+}
+
+impl HeldOut<'_> {
+    /// A decrease of the sum of squares as a decrease of the rms, with its standard error: `Δ(rms²) = 2 rms Δrms`.
+    fn decrease_um(&self, fall: HeldOutDecrease) -> (f64, f64) {
+        let by_um = |by: f64| {
+            let squares_um = by / self.rows * self.scale_um * self.scale_um;
+            squares_um / (2.0 * self.last_um()).max(f64::MIN_POSITIVE)
+        };
+        (by_um(fall.by), by_um(fall.standard_error))
+    }
 }
 
 #[cfg(test)]

@@ -5,7 +5,6 @@
 //! itself. The held-out error therefore belongs to a search without access to the held-out readings.
 
 mod heldout;
-mod models;
 mod objective;
 mod pool;
 mod tuning;
@@ -16,15 +15,16 @@ use std::sync::Arc;
 use abbe_model::Diagnostic;
 use abbe_model::driver::Driver;
 use abbe_model::effect::{Component, Effect};
+use heldout::Averaged;
+pub use heldout::{RejectedByHeldOut, Selection, UnwhitenedModel};
 
 use super::constants::{Effort, ON_ALL, ON_FOLDS};
 use super::interrupt::Interrupt;
 use super::policy::Policy;
 use crate::candidates::candidate::Candidate;
 use crate::candidates::columns::Columns;
+use crate::candidates::gain::{Gain, TrainedModel};
 use crate::candidates::gram::Gram;
-use heldout::Averaged;
-pub use heldout::{RejectedByHeldOut, Selection, UnwhitenedModel};
 
 /// An effect that a search has selected.
 #[derive(Clone, Copy, Debug)]
@@ -149,5 +149,58 @@ impl<'s> SearchState<'s> {
     /// How many candidates the steps of a branch with some training folds try.
     pub fn effort(&self, folds: &[usize]) -> &'static Effort {
         if folds.len() == self.selection.branches[ALL].folds.len() { &ON_ALL } else { &ON_FOLDS }
+    }
+}
+
+impl SearchState<'_> {
+    /// The model with some candidates, trained on some folds.
+    pub fn model_of(&self, chosen: &[usize], folds: &[usize]) -> Result<TrainedModel<'_>, Diagnostic> {
+        self.check()?;
+        TrainedModel::new(&self.gram, chosen, folds)
+    }
+
+    /// The gains of the candidates that may be added to a model; those of the others are zero.
+    pub fn gains(&self, model: &TrainedModel<'_>) -> Result<Vec<Gain>, Diagnostic> {
+        self.remaining_gains(model, Vec::new())
+    }
+
+    /// The same. `known` are those of the first candidates with the same model.
+    pub fn remaining_gains(&self, model: &TrainedModel<'_>, known: Vec<Gain>) -> Result<Vec<Gain>, Diagnostic> {
+        model.remaining_gains(known, &|candidate| self.may_be_added(candidate, &model.folds))
+    }
+
+    /// The model with the selected effects, without the `k`-th if one is given, on all readings.
+    pub fn model_without(&self, left_out: Option<usize>) -> Result<TrainedModel<'_>, Diagnostic> {
+        let mut chosen = self.selection.branches[ALL].chosen();
+        if let Some(k) = left_out {
+            chosen.remove(k);
+        }
+        self.model_of(&chosen, &self.selection.branches[ALL].folds)
+    }
+
+    /// Forms the products of the library for every branch.
+    pub fn prepare_branches(&self) -> Result<(), Diagnostic> {
+        let folds: Vec<&[usize]> = self.selection.branches.iter().map(|branch| &branch.folds[..]).collect();
+        self.gram.prepare(&folds, &|| self.should_continue())
+    }
+
+    /// Forgets the products of effects that were tried on a branch and are not selected.
+    pub fn forget_unselected(&self, branch: usize) {
+        let branch = &self.selection.branches[branch];
+        self.gram.keep_chosen(&branch.folds, &branch.chosen());
+    }
+
+    /// Forgets the products of the selected effects of every branch. They are formed again where they are needed.
+    pub fn forget_chosen(&self) {
+        self.selection.branches.iter().for_each(|branch| self.gram.keep_chosen(&branch.folds, &[]));
+    }
+
+    /// Whether the caller has not stopped the trace.
+    pub fn should_continue(&self) -> bool {
+        self.check().is_ok()
+    }
+
+    fn check(&self) -> Result<(), Diagnostic> {
+        self.interrupt.map_or(Ok(()), |interrupt| interrupt.check())
     }
 }

@@ -8,7 +8,6 @@
 //! everything else in the file; it is not interpreted.
 
 mod contents;
-mod direction;
 
 use std::path::Path;
 
@@ -17,7 +16,7 @@ use abbe_model::instrument::column::Quantity;
 use abbe_model::session::motion::{Course, Motion, Moved};
 use abbe_model::session::readings::{Origin, Readings};
 use abbe_model::session::trajectory;
-use contents::READINGS;
+use contents::{READINGS, Run};
 
 use super::columns::Role;
 use super::fill::Filling;
@@ -76,7 +75,7 @@ fn read(file: &Path, request: &Request<'_>) -> Result<(FileStamp, Filling), Diag
     let mut readings =
         Readings { positions: vec![Vec::new(); request.machine.axes.len()], channels: 1, ..Readings::default() };
     let mut line = Vec::new();
-    let directions = direction::of_runs(&contents.runs, request.format.anticlockwise.as_deref())
+    let directions = of_runs(&contents.runs, request.format.anticlockwise.as_deref())
         .map_err(|(line, message, help)| fault(line, message, help))?;
     for (index, (run, forward)) in contents.runs.iter().zip(directions).enumerate() {
         let part = |c: char| c.is_whitespace() || c == ';' || (c == ',' && request.format.decimal != b',');
@@ -140,5 +139,101 @@ fn value_role(file: &Path, request: &Request<'_>) -> Result<Role, Diagnostic> {
     match Role::of(&entry.own, request) {
         Some(role @ Role::Reading(Quantity::Deviation | Quantity::Length, _)) => Ok(role),
         _ => Err(fault(entry.location.clone(), format!("READINGS cannot be `{}`", entry.own))),
+    }
+}
+
+const CLOCKWISE: [&str; 3] = ["CW", "CLOCKWISE", "CLOCK_WISE"];
+const ANTICLOCKWISE: [&str; 6] =
+    ["CCW", "ACW", "ANTICLOCKWISE", "COUNTERCLOCKWISE", "ANTI_CLOCKWISE", "COUNTER_CLOCKWISE"];
+const KNOWN: &str = "known words are CW, CCW, CLOCKWISE, ANTICLOCKWISE, COUNTERCLOCKWISE; for others use \
+                     `[format] anticlockwise = \"…\"`, the word for the direction from the first axis of the plane towards the second";
+
+/// Whether each run goes from the first axis of the plane towards the second. If that is unknown, the error is a line,
+/// a message and what to do.
+///
+/// Known words keep their meaning whatever is stated, except that a stated clockwise word reverses them. Of other
+/// words, the stated one means forward and one other backward. Case is ignored; `1`, `true` and `yes` are one value,
+/// and so are `0`, `false` and `no`.
+fn of_runs(runs: &[Run], stated: Option<&str>) -> Result<Vec<bool>, (usize, String, String)> {
+    // Seen from below, the direction from the first axis to the second is clockwise, and a file may call it so.
+    let turned = stated.and_then(known_meaning) == Some(false);
+    let stated = stated.map(normalised);
+    let mut other: Option<String> = None;
+    runs.iter()
+        .map(|run| {
+            let fault = |message: String| Err((run.line, message, KNOWN.to_string()));
+            let Some(direction) = &run.direction else {
+                return fault("READINGS without a RUN_DIRECTION".into());
+            };
+            if let Some(anticlockwise) = known_meaning(direction) {
+                return Ok(anticlockwise != turned);
+            }
+            let word = normalised(direction);
+            match &stated {
+                Some(stated) if *stated == word => Ok(true),
+                Some(_) if other.get_or_insert_with(|| word.clone()) == &word => Ok(false),
+                Some(_) => fault(format!(
+                    "RUN_DIRECTION is `{direction}`: neither the word stated by `anticlockwise`, nor `{}`, the other word in this file",
+                    other.as_deref().unwrap_or("")
+                )),
+                None => fault(format!("RUN_DIRECTION is `{direction}`, which is not known")),
+            }
+        })
+        .collect()
+}
+
+/// The meaning of a known word: whether it is anticlockwise.
+fn known_meaning(word: &str) -> Option<bool> {
+    let word = word.trim().to_uppercase().replace([' ', '-'], "_");
+    if ANTICLOCKWISE.contains(&word.as_str()) {
+        Some(true)
+    } else if CLOCKWISE.contains(&word.as_str()) {
+        Some(false)
+    } else {
+        None
+    }
+}
+
+/// The word in normalised form.
+fn normalised(word: &str) -> String {
+    let word = word.trim().to_uppercase();
+    match word.as_str() {
+        "TRUE" | "YES" => "1".into(),
+        "FALSE" | "NO" => "0".into(),
+        _ => word,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(directions: &[&str], stated: Option<&str>) -> Result<Vec<bool>, String> {
+        let runs: Vec<Run> = directions
+            .iter()
+            .map(|direction| Run { line: 1, direction: Some(direction.to_string()), text: String::new() })
+            .collect();
+        of_runs(&runs, stated).map_err(|(_, message, _)| message)
+    }
+
+    #[test]
+    fn known_words_keep_their_meaning_whatever_is_stated() {
+        for stated in [None, Some("0"), Some("true"), Some("CCW"), Some("ccw"), Some("anti-clockwise")] {
+            for words in [["CCW", "CW"], ["ccw", "cw"], ["Counter-Clockwise", "clockwise"]] {
+                assert_eq!(of(&words, stated), Ok(vec![true, false]), "{words:?} {stated:?}");
+            }
+        }
+        assert_eq!(of(&["CW", "CCW"], Some("cw")), Ok(vec![true, false]));
+    }
+
+    #[test]
+    fn the_stated_word_means_forward_and_one_other_backward() {
+        assert_eq!(of(&["0", "1", "0"], Some("0")), Ok(vec![true, false, true]));
+        assert_eq!(of(&["FALSE", "True"], Some("0")), Ok(vec![true, false]));
+        assert_eq!(of(&["0", "1"], Some("true")), Ok(vec![false, true]));
+        assert_eq!(of(&["Links", "rechts"], Some("links")), Ok(vec![true, false]));
+        assert!(of(&["0"], None).unwrap_err().contains("`0`, which is not known"));
+        let third = of(&["0", "1", "2"], Some("0")).unwrap_err();
+        assert!(third.contains("`2`") && third.contains("`1`"), "{third}");
     }
 }
