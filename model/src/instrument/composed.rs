@@ -579,8 +579,9 @@ impl Instrument for Composed<f64> {
     /// Points whose distance is read nominally do not coincide.
     fn check_set_up(&self, checked: &Checked<'_>) -> Result<(), Fault> {
         let layout = self.layout();
-        for (row, reading) in checked.nominal(self).enumerate() {
-            for ((sum, channel), value) in layout.sums.iter().zip(layout.channels).zip(reading.channels()) {
+        let nominal = checked.nominal(Station::Composed(self.clone()));
+        for (row, reading) in nominal.chunks(layout.channels.len()).enumerate() {
+            for ((sum, channel), value) in layout.sums.iter().zip(layout.channels).zip(reading) {
                 if matches!(sum.term, Term::Distance(_)) && value + self.less_mm(sum) < MIN_MM {
                     return Err((
                         format!(
