@@ -13,6 +13,7 @@ use abbe_apply::export::{left_out, urdf, urdf_patch};
 use abbe_files::Source;
 use abbe_files::robot::dh::{self as table, Convention};
 use abbe_identify::error;
+use abbe_identify::fit::frames::SetUpFrame;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_model::Diagnostic;
 use abbe_model::component::ErrorKind;
@@ -21,6 +22,7 @@ use serde::Serialize;
 
 use crate::printers::csv;
 use crate::report::export::{self as present, uncertainties};
+use crate::report::frames;
 use crate::report::table::Table;
 
 /// A format.
@@ -91,6 +93,7 @@ pub fn formats() -> Vec<ExportFormat> {
         described("table", "where each axis is: point and direction, for any control", of_table),
         described("urdf", "URDF of the calibrated chain", of_urdf),
         described("dh", "Denavit-Hartenberg parameters, calibrated and nominal", of_dh),
+        described("ros", "ROS 2 static transforms: where the instrument stands, how its target is mounted", of_frames),
     ];
     let of_control = |control: &'static Control| {
         let about = match &control.kinematics {
@@ -145,6 +148,9 @@ pub struct ExportResult {
     /// Their covariance, mm and degrees.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub dh_covariance: Vec<Vec<f64>>,
+    /// Where the instruments stand and how their targets are mounted.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub frames: Vec<SetUpFrame>,
     /// Where each axis is.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub axes: Vec<AxisPlace>,
@@ -277,6 +283,17 @@ fn of_dh(model: &IdentifiedModel, options: &ExportOptions) -> Result<Exported, D
     };
     let stated = result.remaining.map_or(String::new(), |remaining| format!("# {}\n", remaining.words()));
     tabled(stated + &present::dh_header(&table), table, result)
+}
+
+fn of_frames(model: &IdentifiedModel, _: &ExportOptions) -> Result<Exported, Diagnostic> {
+    if model.frames.is_empty() {
+        let holds = "it holds frames of trackers, poses, sockets and distances, and the model has none; save it again if it \
+                     is of an earlier version";
+        return Err(unrepresentable("the format", "the model", holds));
+    }
+    let result = ExportResult { frames: model.frames.clone(), ..ExportResult::default() };
+    let contents = Contents::File(frames::transforms(&model.frames).into_bytes());
+    Ok(Exported { contents, table: Some(frames::table(&model.frames)), result })
 }
 
 fn of_control(model: &IdentifiedModel, control: &Control, options: &ExportOptions) -> Result<Exported, Diagnostic> {

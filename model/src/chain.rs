@@ -17,7 +17,7 @@ use crate::body::Body;
 use crate::code::StructuralCode;
 use crate::component::{ErrorKind, ErrorName};
 use crate::diagnostic::{Area, Code};
-use crate::frames::{Point, Rotation, SinCos, SmallMotion, cross_nominal};
+use crate::frames::{FixedPose, Point, Rotation, SinCos, SmallMotion, cross_nominal};
 use crate::scalar::{Nominal, Scalar};
 use crate::words::{MAX_QUOTED, cut};
 
@@ -37,6 +37,8 @@ pub struct Machine {
     pub rotation: Rotation,
     /// Direction of gravity in R, a unit vector.
     pub gravity: [f64; 3],
+    /// The flange of a robot in R with all axes at zero: the frame in which what is mounted there is reported.
+    pub flange: Option<FixedPose>,
     /// Bodies that can collide.
     pub bodies: Vec<Body>,
 }
@@ -187,6 +189,7 @@ impl Machine {
             axes,
             rotation: Rotation::Exact,
             gravity: [0.0, 0.0, -1.0],
+            flange: None,
             bodies: Vec::new(),
         })
     }

@@ -3,6 +3,7 @@
 //! Motions transform points; motions are never multiplied. The transformation of a point takes 4 products per rotation
 //! and preserves the sparsity that a product of 4 × 4 matrices of dual numbers would lose.
 
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -231,4 +232,68 @@ pub(crate) fn turn_about_nominal<S: Scalar>(axis: Coordinate, turn: SinCos<S::No
     turned.0[first] = u * turn.cos - v * turn.sin;
     turned.0[second] = u * turn.sin + v * turn.cos;
     turned
+}
+
+/// A fixed pose: `Trans(x, y, z)·Rz(yaw)·Ry(pitch)·Rx(roll)`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FixedPose {
+    /// Position, mm.
+    pub xyz_mm: [f64; 3],
+    /// Roll, pitch and yaw about the fixed axes X, Y, Z in this order, degrees.
+    pub rpy_deg: [f64; 3],
+}
+
+impl From<&Isometry3<f64>> for FixedPose {
+    fn from(pose: &Isometry3<f64>) -> FixedPose {
+        let rpy = roll_pitch_yaw(&pose.rotation);
+        FixedPose { xyz_mm: pose.translation.vector.into(), rpy_deg: rpy.map(f64::to_degrees) }
+    }
+}
+
+impl From<&FixedPose> for Isometry3<f64> {
+    fn from(pose: &FixedPose) -> Isometry3<f64> {
+        let [roll, pitch, yaw] = pose.rpy_deg.map(f64::to_radians);
+        let rotation = turn(2, yaw) * turn(1, pitch) * turn(0, roll);
+        Isometry3::from_parts(Translation3::from(Vector3::from(pose.xyz_mm)), rotation)
+    }
+}
+
+/// A turn about the coordinate axis 0, 1 or 2 by an angle, rad.
+pub fn turn(axis: usize, angle: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_scaled_axis(Vector3::ith(axis, angle))
+}
+
+/// Cosine of the pitch below which roll and yaw turn about one line: the yaw is 0 then.
+const MIN_COS_PITCH: f64 = 1e-9;
+
+/// Roll, pitch and yaw of a rotation, rad: `Rz(yaw)·Ry(pitch)·Rx(roll)`, about fixed axes.
+pub fn roll_pitch_yaw(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
+    let [x, y, z]: [f64; 3] = (rotation * Vector3::x()).into();
+    let level = x.hypot(y);
+    let yaw = if level > MIN_COS_PITCH { y.atan2(x) } else { 0.0 };
+    let pitch = (-z).atan2(level);
+    // What remains is the roll, however near to the vertical: the three give the rotation back.
+    let rest = (turn(2, yaw) * turn(1, pitch)).inverse() * rotation;
+    let roll = 2.0 * rest.i.atan2(rest.w);
+    [roll - std::f64::consts::TAU * (roll / std::f64::consts::TAU).round(), pitch, yaw]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Back to the same matrix, with the X axis of the frame up or down too, where the usual formulas divide by zero.
+    #[test]
+    fn roll_pitch_and_yaw_give_the_rotation_back() {
+        for pitch in [0.0, 30.0, -89.999_999_9, 90.0, 90.000_000_1, -90.0] {
+            for (roll, yaw) in [(0.0, 0.0), (170.0, -120.0), (-35.0, 180.0), (90.0, 45.0)] {
+                let pose = FixedPose { xyz_mm: [1.0, -2.0, 3.0], rpy_deg: [roll, pitch, yaw] };
+                let expected = Isometry3::from(&pose);
+                let found = Isometry3::from(&FixedPose::from(&expected));
+                let apart = (found.to_homogeneous() - expected.to_homogeneous()).abs().max();
+                assert!(apart < 1e-14, "{pose:?}: {apart:e}");
+            }
+        }
+    }
 }

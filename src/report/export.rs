@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use abbe::apply::compare::workspace::AxisRange;
 use abbe::apply::compensation::PointUncertainty;
-use abbe::apply::export::dh::{DhTables, FixedPose, PARAMETERS};
+use abbe::apply::export::dh::{DhTables, PARAMETERS};
 use abbe::apply::export::kinematics::{EntryChoice, KinematicTable};
 use abbe::apply::export::neutral::AxisPlace;
 use abbe::exports::ExportResult;
 use abbe::files::robot::dh::Convention;
+use abbe::model::frames::FixedPose;
 
 use super::block::Report;
 use super::table::{Cell, Column, Table, cells, numbers};

@@ -3,6 +3,7 @@
 use abbe::document::StatedFit;
 use abbe::identify::circular::CircularTest;
 use abbe::identify::figure::{Definition, Figure};
+use abbe::identify::fit::frames::SetUpFrame;
 use abbe::identify::fit::{Fit, FitResult};
 use abbe::identify::problem::Problem;
 use abbe::identify::propagation::{FitMonteCarlo, Verdict};
@@ -23,7 +24,7 @@ use super::session;
 use super::session::plots::SessionPlots;
 use super::statements::{self, IDENTIFIES, IMPROVES};
 use super::table::{Cell, Column, Table, cells, numbers, words};
-use super::{conformity, confounded, parameters, plausibility, standards};
+use super::{conformity, confounded, frames, parameters, plausibility, standards};
 
 /// The report of a fit; with `figures`, for a page.
 ///
@@ -49,6 +50,7 @@ pub fn report(
     report
         .opening("", contradicted.into_iter().chain(failed).map(Sentence::from).chain(opening).chain([extent.into()]));
     report.values = Figures::of_fit(result);
+    frames::section(&mut report, &result.frames);
     let mut figures_of_quality = quality::key_figures(model, None);
     figures_of_quality.push(quality::readings(problem, model));
     report.key(figures_of_quality);
@@ -198,6 +200,7 @@ impl Figures {
         let mut figures = Figures::default();
         figures.residual("residual", &result.model);
         figures.parameters("parameters", &result.model.parameters);
+        result.frames.iter().for_each(|frame| figures.frame(frame));
         result.circular.iter().for_each(|test| figures.circular(test));
         for test in &result.positioning {
             figures.standard(&format!("positioning {}", test.test), "", &test.read.figures);
@@ -249,6 +252,17 @@ impl Figures {
                 .iter()
                 .map(|p| cells![section, &p.id, &p.meaning, Cell::exact(p.value), Cell::exact(p.u), &p.unit]),
         );
+    }
+
+    /// Position and rotation of a frame of the set-up.
+    fn frame(&mut self, frame: &SetUpFrame) {
+        let (section, names) =
+            (format!("frame {} {}", frame.parent, frame.child), ["x", "y", "z", "roll", "pitch", "yaw"]);
+        let values = frame.xyz_mm.into_iter().zip(frame.u_xyz_mm).map(|pair| (pair, "mm"));
+        let angles = frame.rpy_deg.into_iter().zip(frame.u_rpy_deg).map(|pair| (pair, "deg"));
+        for (name, ((value, u), unit)) in names.into_iter().zip(values.chain(angles)) {
+            self.estimate(&section, name, &frame.meaning, u.map(|u| (value, u)), unit);
+        }
     }
 
     /// The decision about each item; its value is the probability that it is within its limits.

@@ -18,6 +18,7 @@ pub mod effects;
 pub mod export;
 pub mod figure;
 pub mod fit;
+pub mod frames;
 #[cfg(feature = "fleet")]
 pub mod history;
 pub mod import;

@@ -18,13 +18,14 @@ use abbe_identify::model_file::IdentifiedModel;
 use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::component::ErrorKind;
+use abbe_model::frames::FixedPose;
 use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::dh_frames::{self, Frames};
 use super::entries::best_locations;
-use super::frames::{roll_pitch_yaw, tool_side};
+use super::frames::tool_side;
 use crate::error::unrepresentable;
 
 /// One joint.
@@ -73,24 +74,6 @@ pub struct DhUncertainty {
     pub theta_deg: Option<f64>,
     /// Of the length along the axis, mm.
     pub d_mm: Option<f64>,
-}
-
-/// A fixed pose: `Trans(x, y, z)·Rz(yaw)·Ry(pitch)·Rx(roll)`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
-pub struct FixedPose {
-    /// Position, mm.
-    pub xyz_mm: [f64; 3],
-    /// Roll, pitch and yaw, degrees.
-    pub rpy_deg: [f64; 3],
-}
-
-impl FixedPose {
-    pub(super) fn of(pose: &Isometry3<f64>) -> FixedPose {
-        FixedPose {
-            xyz_mm: pose.translation.vector.into(),
-            rpy_deg: roll_pitch_yaw(&pose.rotation).map(f64::to_degrees),
-        }
-    }
 }
 
 /// The parameters of a chain.
@@ -171,7 +154,7 @@ pub fn tables(
         let found = dh_frames::near(&nominal, &lines, &end);
         let rows = found.rows(convention);
         let joints: Vec<DhRow> = names.iter().zip(&rows).map(|(name, row)| DhRow::of(name, *row)).collect();
-        let table = DhTable { base: FixedPose::of(&found.base), joints, tool: FixedPose::of(&found.tool) };
+        let table = DhTable { base: FixedPose::from(&found.base), joints, tool: FixedPose::from(&found.tool) };
         Ok((table, rows.into_iter().flatten().collect()))
     };
     let (errors, _) = best_locations(model, tool_mm)?;

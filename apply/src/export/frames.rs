@@ -11,7 +11,7 @@ use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{ERRORS_PER_AXIS, Machine};
 use abbe_model::frames::Rotation;
-use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use abbe_identify::model_file::IdentifiedModel;
 
@@ -112,10 +112,4 @@ impl Branch {
             .collect();
         (lines, frame * self.end)
     }
-}
-
-/// Roll, pitch and yaw of a rotation, rad: `Rz(yaw)·Ry(pitch)·Rx(roll)`, about fixed axes.
-pub fn roll_pitch_yaw(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
-    let (roll, pitch, yaw) = Rotation3::from(*rotation).euler_angles();
-    [roll, pitch, yaw]
 }

@@ -6,13 +6,13 @@ use abbe_identify::model_file::{IdentifiedModel, ModelParameter, Provenance};
 use abbe_identify::noise::{Noise, NoiseSource};
 use abbe_identify::results::ModelFit;
 use abbe_model::chain::{AxisPosition, Frame, Machine};
-use abbe_model::frames::Point;
+use abbe_model::frames::{FixedPose, Point};
 use abbe_model::unit::Unit;
 use faer::Mat;
 use nalgebra::{Matrix4, Rotation3, Vector3};
 use rand::{Rng, RngExt, SeedableRng};
 
-use super::dh::{DhTable, DhTables, FixedPose};
+use super::dh::{DhTable, DhTables};
 use super::frames::location_errors;
 use super::{dh, urdf};
 
@@ -54,6 +54,7 @@ pub(super) fn model(machine: Machine, errors: &[(String, f64)]) -> IdentifiedMod
         motion_ranges: Vec::new(),
         tool_mm: [0.0; 3],
         table_mm: [0.0; 3],
+        frames: Vec::new(),
         reference: abbe_model::driver::Reference::default(),
         provenance: Provenance::default(),
     }

@@ -10,11 +10,12 @@ use std::fmt::Write;
 use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
+use abbe_model::frames::roll_pitch_yaw;
 use abbe_model::unit::Unit;
 use nalgebra::Isometry3;
 
 use super::entries::best_locations;
-use super::frames::{Branch, roll_pitch_yaw, tool_side, workpiece_side};
+use super::frames::{Branch, tool_side, workpiece_side};
 use super::left_out;
 use abbe_identify::model_file::IdentifiedModel;
 

@@ -11,11 +11,12 @@ use abbe_identify::error;
 use abbe_identify::model_file::IdentifiedModel;
 use abbe_model::Diagnostic;
 use abbe_model::axis::AxisKind;
+use abbe_model::frames::roll_pitch_yaw;
 use abbe_model::unit::Unit;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::entries::best_locations;
-use super::frames::{JointFrame, roll_pitch_yaw, tool_side};
+use super::frames::{JointFrame, tool_side};
 
 /// Largest distance between an axis of the file and of the model's machine, mm; and of their directions.
 const SAME_MM: f64 = 1e-3;

@@ -6,6 +6,7 @@ use abbe_model::code::StructuralCode;
 use abbe_model::document::fault::{Fault, Within};
 use abbe_model::document::machine as document;
 use abbe_model::document::value::Vector;
+use abbe_model::frames::FixedPose;
 
 use super::body::{self, BodyFiles};
 use crate::spelling::known_names;
@@ -40,6 +41,10 @@ pub(crate) fn machine(document: &document::Machine, files: &mut BodyFiles<'_>) -
         axes: axes.collect::<Result<_, Fault>>()?,
         rotation: document.rotation.unwrap_or_default(),
         gravity,
+        flange: document.flange.as_ref().map(|flange| FixedPose {
+            xyz_mm: flange.xyz_mm.0,
+            rpy_deg: flange.rpy_deg.as_ref().map_or([0.0; 3], |angles| angles.0),
+        }),
         bodies: Vec::new(),
     };
     machine.bodies = body::bodies(&machine, &document.body, files).within("body")?;

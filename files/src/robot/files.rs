@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use abbe_model::axis::AxisKind;
+use abbe_model::frames::FixedPose;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::chain::{Chain, Joint};
@@ -66,6 +67,8 @@ fn machine(chain: &Chain, source: &str) -> String {
         let _ = writeln!(text, "# Assumed: {}.", plain(assumed));
     }
     let _ = write!(text, "name = \"{}\"\nchain = \"w b {} t\"\n", plain(&chain.name), names.join(" "));
+    let FixedPose { xyz_mm, rpy_deg } = FixedPose::from(&chain.end);
+    let _ = writeln!(text, "flange = {{ xyz_mm = {}, rpy_deg = {} }}", list(xyz_mm), list(rpy_deg));
     for (number, joint) in chain.joints.iter().enumerate() {
         let (point, direction) = chain.line(number);
         let _ = write!(text, "\n[axis.{}]\n", names[number]);

@@ -54,6 +54,9 @@ pub enum Gauge {
     /// direction of their axis before those along or about it. Base parameters are then preferably a joint's own
     /// offset and angle, in order from the tool to the bed.
     OwnDirection,
+    /// The same order with the set-up in units 1000 times as large, so that a location error is held however far its target
+    /// is: the set-up keeps its values.
+    Machine,
     /// Location errors before coefficients before set-up parameters, by identifier: the pivots of the null space in the
     /// result of a fit.
     Identifier,
@@ -65,6 +68,9 @@ pub enum Gauge {
 /// of robots have components of rounding across them.
 const OWN_SHARE: f64 = 0.5;
 
+/// Physical size of a quantity of the set-up under [`Gauge::Machine`], in its own physical sizes.
+const LARGE: f64 = 1e3;
+
 impl Gauge {
     /// The parameters in the order in which they are preferably held.
     fn preference(self, machine: &Machine, list: &[Parameter]) -> Vec<usize> {
@@ -73,7 +79,7 @@ impl Gauge {
             if self == Gauge::SetUp { 2 - kind } else { kind }
         };
         let own = |parameter: &Parameter| {
-            let name = parameter.id.error().filter(|_| self == Gauge::OwnDirection);
+            let name = parameter.id.error().filter(|_| matches!(self, Gauge::OwnDirection | Gauge::Machine));
             let axis = name.and_then(|name| machine.axis_index(&name.axis));
             name.zip(axis)
                 .is_some_and(|(name, axis)| machine.axes[axis].direction[name.freedom.index() % 3].abs() > OWN_SHARE)
@@ -93,6 +99,9 @@ pub struct BaseParameters {
     pub beta: Vec<f64>,
     /// Covariance of all parameters, with the fit's factor on uncertainties; 0 for the held ones.
     pub covariance: Mat<f64>,
+    /// The change of each parameter per unit of a held one, internal units, without a change of any reading: parameters ×
+    /// parameters, the identity but for the columns of the held ones.
+    pub transfer: Mat<f64>,
     /// Number of directions that stay at nominal as combinations: the readings determine them by less than their noise.
     pub held_combinations: usize,
     /// The directions that the readings determine by less than their noise, or not at all, at `beta`: orthonormal, in
@@ -113,9 +122,11 @@ const MAX_STEPS: usize = 20;
 /// If the model cannot be evaluated, or the null space has no stable parametrisation.
 pub fn base_parameters(problem: &Problem, fit: &Fit, gauge: Gauge) -> Result<BaseParameters, Diagnostic> {
     let list = &problem.parameters.list;
-    let sizes = problem.parameters.sizes();
+    let is_large = |parameter: &Parameter| gauge == Gauge::Machine && parameter.id.is_setup();
+    let size = |parameter: &Parameter| parameter.size * if is_large(parameter) { LARGE } else { 1.0 };
+    let sizes: Vec<f64> = list.iter().map(size).collect();
     let preference = gauge.preference(&problem.session.machine, list);
-    let at_solution = directions_at(problem, &fit.beta, &fit.triangles)?;
+    let at_solution = directions_at(problem, &fit.beta, &fit.triangles, &sizes)?;
     let exact_rank = at_solution.numerical_rank();
     let exact = at_solution.right().subcols(exact_rank, list.len() - exact_rank).to_owned();
     let (combinations, mut held) = echelon(exact.as_ref(), &preference, MIN_PIVOT);
@@ -145,10 +156,11 @@ pub fn base_parameters(problem: &Problem, fit: &Fit, gauge: Gauge) -> Result<Bas
     }
     let held_combinations = fit.rank.null_space.ncols().saturating_sub(exact.ncols());
     // The least determined directions depend on the place in the null space.
-    let at_base = directions_at(problem, &beta, &problem.triangles(&beta)?)?;
+    let triangles = problem.triangles(&beta)?;
+    let at_base = directions_at(problem, &beta, &triangles, &problem.parameters.sizes())?;
     let identifiable = fit.rank.identifiable_basis.ncols().min(exact_rank);
     let null_space = at_base.right().subcols(identifiable, list.len() - identifiable).to_owned();
-    Ok(BaseParameters { held, beta, covariance, held_combinations, null_space, prediction_change_mm })
+    Ok(BaseParameters { held, beta, covariance, transfer, held_combinations, null_space, prediction_change_mm })
 }
 
 impl BaseParameters {
@@ -179,11 +191,10 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<BaseResult, Diagnostic> {
     })
 }
 
-/// The directions of the scaled parameters at a point, the best determined first. Those whose singular value is a
+/// The directions of the parameters at a point, scaled by these sizes, the best determined first. Those whose singular value is a
 /// rounding error change no reading at all. A direction that is null at the nominal machine only changes readings at
 /// the solution.
-fn directions_at(problem: &Problem, beta: &[f64], triangles: &[Triangle]) -> Result<Svd, Diagnostic> {
-    let sizes = problem.parameters.sizes();
+fn directions_at(problem: &Problem, beta: &[f64], triangles: &[Triangle], sizes: &[f64]) -> Result<Svd, Diagnostic> {
     let r = problem.prior_triangle(beta).merged(triangles).r();
     Svd::of(Mat::from_fn(r.nrows(), sizes.len(), |i, j| r[(i, j)] * sizes[j]).as_ref())
 }
@@ -255,7 +266,7 @@ mod tests {
         };
         let expected_u = u_of(&fit.beta, &fit.covariance);
         let mut all_held = Vec::new();
-        for gauge in [Gauge::OwnDirection, Gauge::Identifier, Gauge::SetUp] {
+        for gauge in [Gauge::OwnDirection, Gauge::Machine, Gauge::Identifier, Gauge::SetUp] {
             let base = base_parameters(&problem, &fit, gauge).unwrap();
             assert!(base.prediction_change_mm < 1e-9, "{gauge:?}: {:e}", base.prediction_change_mm);
             let residuals = problem.residuals(&base.beta);
@@ -270,6 +281,6 @@ mod tests {
             assert_eq!(base.held.len() + base.held_combinations, held_by_fit);
             all_held.push(base.held);
         }
-        assert_ne!(all_held[0], all_held[2]);
+        assert_ne!(all_held[0], all_held[3]);
     }
 }

@@ -11,6 +11,7 @@ pub mod base;
 mod covariance;
 mod cover;
 pub mod families;
+pub mod frames;
 mod further_steps;
 pub(crate) mod numbers;
 pub mod outcome;

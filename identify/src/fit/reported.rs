@@ -10,7 +10,7 @@ use abbe_model::unit::ARCSEC_PER_RAD;
 use super::outcome::{self, Determined};
 use super::quantities::{Quantity, quantities, rms_of_waves, slopes_of_rms, u_of_undetermined_phase_deg};
 use super::{Fit, StepPosition, covariance, enlargement_warning};
-use super::{assume, cover};
+use super::{assume, cover, frames};
 use crate::circular;
 use crate::fit::FitResult;
 use crate::heldout::cross_validation;
@@ -56,6 +56,7 @@ pub fn report(problem: &Problem, fit: &Fit) -> Result<FitResult, Diagnostic> {
         diagonals,
         straightness: straightness::of_session(&problem.session, &problem.rejected),
         model,
+        frames: frames::frames(problem, fit),
         plausibility,
         warnings,
         about: problem.session.about.iter().cloned().collect(),

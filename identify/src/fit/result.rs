@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::base::BaseResult;
+use super::frames::SetUpFrame;
 use super::tpoint::PointingTerms;
 use crate::circular::CircularTest;
 use crate::plausibility::Plausibility;
@@ -22,6 +23,9 @@ pub struct FitResult {
     /// The fitted model.
     #[serde(flatten)]
     pub model: ModelResult,
+    /// Where the instruments stand and how their targets are mounted, of trackers, poses, sockets and distances.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub frames: Vec<SetUpFrame>,
     /// Ball-bar figures of the tests whose path is a circle.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub circular: Vec<CircularTest>,

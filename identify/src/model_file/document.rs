@@ -18,6 +18,7 @@ use serde::ser::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 
+use crate::fit::frames::SetUpFrame;
 use crate::noise::Noise;
 use crate::results::ModelFit;
 
@@ -96,6 +97,10 @@ pub struct Model<M, E, C> {
     pub tool_mm: [f64; 3],
     /// The instrument's point in the table frame there; 0 for instruments without one.
     pub table_mm: [f64; 3],
+    /// Where the instruments stand and how their targets are mounted.
+    #[serde(skip_serializing_if = "Vec::is_empty", default, deserialize_with = "long")]
+    #[schemars(with = "Long<Vec<SetUpFrame>>")]
+    pub frames: Vec<SetUpFrame>,
     /// Reference values from which drivers count.
     #[serde(serialize_with = "Reference::serialized", deserialize_with = "Reference::deserialized")]
     #[schemars(with = "Reference")]
@@ -124,6 +129,7 @@ impl<M, E, C> Model<M, E, C> {
             motion_ranges: self.motion_ranges,
             tool_mm: self.tool_mm,
             table_mm: self.table_mm,
+            frames: self.frames,
             reference: self.reference,
         }
     }

@@ -28,6 +28,7 @@ pub use read::{is_model, of_source, read};
 
 use crate::error;
 use crate::fit::base::{Gauge, base_parameters};
+use crate::fit::frames::frames;
 use crate::fit::{Fit, minimum};
 use crate::heldout::stated_rms_mm;
 use crate::parameters::Parameter;
@@ -119,6 +120,7 @@ impl IdentifiedModel {
             motion_ranges: motion::of_problem(problem),
             tool_mm: stated.tool_point().mm,
             table_mm: stated.table_point().map_or([0.0; 3], |point| point.mm),
+            frames: frames(problem, fit),
             reference: Reference::without_history(problem.reference.time_s, problem.reference.means.clone()),
             provenance,
         };

@@ -20,12 +20,24 @@ pub struct Machine {
     pub rotation: Option<Rotation>,
     /// Direction of gravity in R; default [0, 0, -1].
     pub gravity: Option<Vector>,
+    /// The flange of a robot in R with all axes at zero; results state there how a target is mounted.
+    pub flange: Option<Flange>,
     /// One table per axis of the chain.
     #[serde(default, skip_serializing_if = "Named::is_empty")]
     pub axis: Named<Axis>,
     /// What can collide: table, spindle, fixtures.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub body: Vec<Body>,
+}
+
+/// The flange of a robot: its frame in R with all axes at zero.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename = "flange", deny_unknown_fields)]
+pub struct Flange {
+    /// Its origin, [x, y, z].
+    pub xyz_mm: Vector,
+    /// Roll, pitch, yaw about the fixed axes X, Y, Z in this order, degrees; default [0, 0, 0].
+    pub rpy_deg: Option<Vector>,
 }
 
 /// An axis of a machine.

@@ -1,7 +1,7 @@
 //! From the domain to documents, which read back to the same bits.
 
 use super::effect::{self, SCALES};
-use super::machine::{Axis, Machine};
+use super::machine::{Axis, Flange, Machine};
 use super::measurement::Test;
 use super::movement::{Circle, Follow, Line, Path, Sweep};
 use super::node::Named;
@@ -26,6 +26,10 @@ pub fn machine(machine: &chain::Machine) -> Machine {
         chain: machine.code(),
         rotation: (machine.rotation == Rotation::SmallAngle).then_some(Rotation::SmallAngle),
         gravity: Some(Three(machine.gravity)),
+        flange: machine
+            .flange
+            .as_ref()
+            .map(|flange| Flange { xyz_mm: Three(flange.xyz_mm), rpy_deg: Some(Three(flange.rpy_deg)) }),
         axis: Named(machine.axes.iter().map(|axis| (axis.name.clone(), self::axis(axis))).collect()),
         body: Vec::new(),
     }

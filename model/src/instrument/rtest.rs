@@ -463,6 +463,7 @@ mod tests {
             workpiece_side: 0,
             rotation: Rotation::Exact,
             gravity: [0.0, 0.0, -1.0],
+            flange: None,
             bodies: Vec::new(),
         };
         let at = MachineState { machine: &machine, state: &[], errors: &[] };

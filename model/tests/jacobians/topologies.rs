@@ -74,6 +74,7 @@ pub fn robot() -> Machine {
         workpiece_side: 0,
         rotation: Rotation::Exact,
         gravity: [0.0, 0.0, -1.0],
+        flange: None,
         bodies: Vec::new(),
     }
 }

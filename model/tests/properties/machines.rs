@@ -159,6 +159,7 @@ pub fn machines() -> impl Strategy<Value = Drawn> {
             workpiece_side,
             rotation,
             gravity: [0.0, 0.0, -1.0],
+            flange: None,
             bodies: Vec::new(),
         };
         Drawn { machine, positions, errors }

@@ -1,6 +1,8 @@
 //! What a session does not know of its set-up is found from any start. Readings are those of rigid motions of nalgebra, which
 //! share no code with the chain.
 
+mod frames;
+
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
