@@ -28,7 +28,7 @@ use rand_pcg::Pcg64;
 
 use crate::error;
 use crate::heldout::folds::Folds;
-use crate::noise::{Noise, ReadingNoise};
+use crate::noise::{Noise, PureError, ReadingNoise, Repeatability};
 use crate::numerics::parallel;
 use crate::numerics::triangle::BLOCK_ROWS;
 use crate::parameters::{Parameters, TestParameters};
@@ -318,6 +318,11 @@ impl Problem {
     /// Number of channels of a reading of a test.
     pub fn channels(&self, test: usize) -> usize {
         self.models[test].weights().len()
+    }
+
+    /// The noise that repeats show, from the residuals of any model, mm, test by test.
+    pub(crate) fn repeatability(&self, residuals: &[Vec<f64>]) -> Repeatability {
+        PureError::of(&self.tests, residuals, |test, row| !self.rejected[test][row]).repeatability()
     }
 
     /// The noise of a reading, as results have it.

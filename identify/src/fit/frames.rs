@@ -150,7 +150,9 @@ pub fn frames(problem: &Problem, fit: &Fit) -> Vec<SetUpFrame> {
         for placed in Placed::of(model.station()) {
             let (parent, before) = outer(machine, placed.on);
             let group = test.group(unknowns[placed.first].shared_by);
-            if found.iter().any(|(frame, placed_group)| *placed_group == group && frame.child == placed.name && frame.parent == parent) {
+            if found.iter().any(|(frame, placed_group)| {
+                *placed_group == group && frame.child == placed.name && frame.parent == parent
+            }) {
                 continue;
             }
             let parameter = |unknown: usize| {

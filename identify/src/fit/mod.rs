@@ -355,7 +355,7 @@ impl Fit {
 fn freedom_of_noise(problem: &Problem, residuals: &[Vec<f64>]) -> Option<usize> {
     let kept = |test: usize, row: usize| !problem.rejected[test][row];
     match problem.noise.source {
-        NoiseSource::Repeats => Some(Repeatability::of(problem, residuals).freedom),
+        NoiseSource::Repeats => Some(problem.repeatability(residuals).freedom),
         NoiseSource::Targets => ShownNoise::of(&problem.tests, residuals, kept).map(|shown| shown.freedom),
         _ => None,
     }

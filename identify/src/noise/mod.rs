@@ -34,7 +34,6 @@ use trends::Trends;
 pub use waves::AlongRuns;
 
 use crate::numerics::parallel;
-use crate::problem::Problem;
 
 /// The noise of one scalar reading.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -205,13 +204,6 @@ pub struct Repeatability {
     pub sigma_mm: Option<f64>,
     /// Degrees of freedom.
     pub freedom: usize,
-}
-
-impl Repeatability {
-    /// From the residuals of any model of a problem, mm, test by test.
-    pub(crate) fn of(problem: &Problem, residuals: &[Vec<f64>]) -> Repeatability {
-        PureError::of(&problem.tests, residuals, |test, row| !problem.rejected[test][row]).repeatability()
-    }
 }
 
 /// Noise of targets below which their instrument has solved them as one rigid body: no instrument reads places in space to

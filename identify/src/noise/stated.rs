@@ -1,6 +1,6 @@
 //! Comparison of the stated noise with the noise of repeats and of several targets.
 
-use super::{RIGID_MM, Repeatability, flange};
+use super::{RIGID_MM, flange};
 use crate::fit::Fit;
 use crate::numerics::tails::chi_square_tails;
 use crate::problem::Problem;
@@ -13,7 +13,7 @@ const DISAGREEMENT_P: f64 = 0.001;
 /// A warning if repeated readings scatter by more than twice or less than half of the stated noise, significantly.
 pub fn stated_against_repeats(problem: &Problem, fit: &Fit) -> Option<String> {
     let stated_mm = problem.session.stated_noise_mm()?;
-    let repeats = fit.repeats.unwrap_or_else(|| Repeatability::of(problem, &fit.residuals));
+    let repeats = fit.repeats.unwrap_or_else(|| problem.repeatability(&fit.residuals));
     let sigma_mm = repeats.sigma_mm?;
     let resolution_mm = problem.session.resolution_noise_mm();
     let ratio = sigma_mm.max(resolution_mm) / stated_mm;

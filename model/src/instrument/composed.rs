@@ -583,13 +583,11 @@ impl Instrument for Composed<f64> {
         for (row, reading) in nominal.chunks(layout.channels.len()).enumerate() {
             for ((sum, channel), value) in layout.sums.iter().zip(layout.channels).zip(reading) {
                 if matches!(sum.term, Term::Distance(_)) && value + self.less_mm(sum) < MIN_MM {
+                    let (test, number, name) = (checked.test, row + 1, channel.name);
                     return Err((
                         format!(
-                            "test \"{}\", reading {}: the two points of the channel \"{}\" nominally coincide, where their \
-                             distance has no direction",
-                            checked.test,
-                            row + 1,
-                            channel.name
+                            "test \"{test}\", reading {number}: the two points of the channel \"{name}\" nominally coincide, \
+                             where their distance has no direction"
                         ),
                         "check the targets and the positions of the axes".into(),
                     ));
