@@ -375,13 +375,15 @@ mod tests {
             ("bar[A.1~x:h2]", ["bar", "", "A.1~x:h2"]),
             ("workpiece_ball.x[P[1]]", ["workpiece_ball", "x", "P[1]"]),
             ("gain", ["gain", "", ""]),
+            // A target of a composed measurement has the name that its session gives.
+            ("sphere.x[S]", ["sphere", "x", "S"]),
         ] {
             let [thing, coordinate, group] = is.map(str::to_string);
             let id = ParameterId::Setup { thing, coordinate, group };
             assert_eq!((text.parse::<ParameterId>().as_ref(), id.to_string().as_str()), (Ok(&id), text));
         }
         assert_eq!("e_x0c".parse::<ParameterId>().map(|id| id.to_string()), Ok("EX0C".to_string()));
-        for text in ["", "bar[A", "bar[]", "EX0C[A]", "set-up", "EZC~C", "EZC~C:", "EZC~C:h2.Phase", "nothing.x[A]"] {
+        for text in ["", "bar[A", "bar[]", "EX0C[A]", "set-up", "EZC~C", "EZC~C:", "EZC~C:h2.Phase", "nothing.w[A]"] {
             assert!(text.parse::<ParameterId>().is_err(), "{text}");
         }
     }
