@@ -8,8 +8,8 @@ use super::table::{Cell, Table, cells, numbers, words};
 
 /// Frames that a terminal shows without `--all`.
 const MAX_FRAMES: usize = 4;
-/// Parameters at nominal that a sentence names.
-const MAX_NAMED: usize = 6;
+/// Frames, and parameters at nominal, that a sentence names.
+const MAX_NAMED: [usize; 2] = [2, 6];
 /// Decimal places of the elements of a rotation.
 const PLACES_OF_ROTATION: usize = 12;
 
@@ -55,13 +55,24 @@ pub fn table(frames: &[SetUpFrame]) -> Table {
     table
 }
 
-/// What a frame is relative to, and where the tool frame lies.
+/// What frames are relative to, those of equal words in one sentence, and where the tool frame lies.
 fn relative(frames: &[SetUpFrame]) -> Vec<String> {
-    let held = frames.iter().filter(|frame| !frame.relative_to.is_empty()).map(|frame| {
-        let named = frame.relative_to.iter().take(MAX_NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
-        let more = frame.relative_to.len().saturating_sub(MAX_NAMED);
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        format!("{} → {}: relative to the errors held at nominal, {named}{more}", frame.parent, frame.child)
+    let mut sentences: Vec<(Vec<String>, &[String])> = Vec::new();
+    for frame in frames.iter().filter(|frame| !frame.relative_to.is_empty()) {
+        let name = format!("{} → {}", frame.parent, frame.child);
+        match sentences.iter_mut().find(|(_, held)| *held == frame.relative_to.as_slice()) {
+            Some((names, _)) => names.push(name),
+            None => sentences.push((vec![name], &frame.relative_to)),
+        }
+    }
+    let listed = |words: &[String], most: usize| {
+        let named = words.iter().take(most).map(String::as_str).collect::<Vec<_>>().join(", ");
+        let more = words.len().saturating_sub(most);
+        if more > 0 { format!("{named} and {more} more") } else { named }
+    };
+    let [most_frames, most_held] = MAX_NAMED;
+    let held = sentences.iter().map(|(names, held)| {
+        format!("{}: relative to the errors held at nominal, {}", listed(names, most_frames), listed(held, most_held))
     });
     let is_tool = frames.iter().any(|frame| frame.parent == "tool");
     let tool = is_tool.then(|| {
@@ -95,7 +106,8 @@ pub fn transforms(frames: &[SetUpFrame]) -> String {
         let Table { rows, notes, .. } = matrix(frame);
         let row = |row: &Vec<Cell>| format!("# {}\n", row.iter().map(Cell::to_string).collect::<Vec<_>>().join(" "));
         let u = frame.u_xyz_mm.map(|u| u.map_or("–".to_string(), |u| format!("{u:.1e}"))).join(", ");
-        let notes = notes.into_iter().chain([format!("u of x, y, z: {u} mm")]).chain(relative(&[frame.clone()]));
+        let notes =
+            notes.into_iter().chain([format!("u of x, y, z: {u} mm")]).chain(relative(std::slice::from_ref(frame)));
         let notes: String = notes.map(|note| format!("# {note}\n")).collect();
         format!("# {}\n{}{notes}{}\n", frame.meaning, rows.iter().map(row).collect::<String>(), frame.ros)
     };
